@@ -1,0 +1,220 @@
+"""Predict and update, recorded once for a filter, a motion and a sensor, run over all lanes.
+
+The update formula is any function (prior, z, components) -> Posterior. Numbers of the motion and
+the sensor are inputs of the kernel, so noises and poses may be fixed, per lane, per step or both,
+and one kernel serves all their values.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import Status, UsageError
+from boresight.filters.kalman import predict
+from boresight.filters.posterior import Posterior
+from boresight.lanes import (
+    Kernel,
+    Leaf,
+    Matrix,
+    Rate,
+    Scalar,
+    States,
+    Symmetric,
+    Vector,
+    make_kernel,
+    pack_states,
+    trace,
+)
+from boresight.maths import Gaussian, select
+from boresight.models.motion import Motion
+from boresight.models.parameters import numbers, rate_of, structure, with_numbers
+from boresight.models.sensors import Radar
+
+Array = Any
+Update = Callable[..., Posterior]
+OUTPUTS = ("mean", "cov", "nis", "dof", "loglik", "innovation", "variance", "status")
+
+
+def leaves(n: int, k: int) -> dict[str, Leaf]:
+    """Shape of every output for n states and k components."""
+    return {
+        "mean": Vector(n),
+        "cov": Symmetric(n),
+        "nis": Scalar(),
+        "dof": Scalar(),
+        "loglik": Scalar(),
+        "innovation": Vector(k),
+        "variance": Vector(k),
+        "status": Scalar(),
+    }
+
+
+def status_of(mean: Array, cov: Array) -> Any:
+    """`Status` of a state: not finite, not positive on its diagonal, or well."""
+    total = sum(abs(x) for x in mean)
+    finite = total * 0.0 < 1.0  # NaN and infinity fail this
+    positive = cov[0, 0] > 0.0
+    for i in range(1, len(mean)):
+        positive = positive & (cov[i, i] > 0.0)
+    bad = select(positive, float(Status.OK), float(Status.NOT_POSITIVE))
+    return select(finite, bad, float(Status.NOT_FINITE))
+
+
+@dataclass(frozen=True)
+class Recursion:
+    """A filter step with its models' structure: what a kernel is made from.
+
+    Attributes:
+        update: the filter's formula.
+        settings: its keyword arguments.
+        motion, sensor: the models; their numbers are not part of the recursion's identity.
+    """
+
+    update: Update
+    settings: tuple[tuple[str, Any], ...]
+    motion: Motion
+    sensor: Radar
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Number of states and of components."""
+        return len(self.motion.names), len(self.sensor.names)
+
+    def models(self) -> dict[str, tuple[Any, Leaf]]:
+        """Numbers of both models."""
+        return numbers(self.motion, "motion") | numbers(self.sensor, "sensor")
+
+    def step(self, state: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[Any, Any]:
+        """One prediction and update of one target; the formula that is recorded."""
+        values = dict(inputs)
+        motion = with_numbers(self.motion, "motion", values)
+        sensor = with_numbers(self.sensor, "sensor", values)
+        prior = predict(Gaussian(state["mean"], state["cov"]), motion, inputs["dt"])
+        post = self.update(prior, inputs["z"], sensor.components(motion), **dict(self.settings))
+        results = post._asdict() | {"status": status_of(post.mean, post.cov)}
+        return {"mean": post.mean, "cov": post.cov}, results
+
+    def kernel(self, rates: Mapping[str, Rate], outputs: Mapping[str, Rate]) -> Kernel:
+        """The compiled step, kept for the next call with the same structure and rates."""
+        identity = (self.update, self.settings, structure(self.motion), structure(self.sensor))
+        wanted, given = tuple(sorted(outputs.items())), tuple(sorted(rates.items()))
+        return _kernel(_Key(self, identity), given, wanted)
+
+
+class _Key:
+    """Compares recursions by what their formula depends on."""
+
+    def __init__(self, recursion: Recursion, identity: tuple[Any, ...]) -> None:
+        self.recursion, self.identity = recursion, identity
+
+    def __hash__(self) -> int:
+        return hash(self.identity)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and self.identity == other.identity
+
+
+@lru_cache(maxsize=128)
+def _kernel(
+    key: _Key, rates: tuple[tuple[str, Rate], ...], outputs: tuple[tuple[str, Rate], ...]
+) -> Kernel:
+    recursion, rate = key.recursion, dict(rates)
+    n, k = recursion.size
+    shapes = {"z": Vector(k), "dt": Scalar()}
+    shapes |= {name: leaf for name, (_, leaf) in recursion.models().items()}
+    return make_kernel(
+        trace(
+            recursion.step,
+            state={"mean": Vector(n), "cov": Symmetric(n)},
+            inputs={name: (shape, rate[name]) for name, shape in shapes.items()},
+            outputs={name: (_full(leaves(n, k)[name]), when) for name, when in outputs},
+        )
+    )
+
+
+def _full(leaf: Leaf) -> Leaf:
+    """Covariances leave as full matrices: a caller's NumPy needs no unpacking."""
+    return Matrix(*leaf.shape) if leaf.symmetric else leaf
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What a filter says of every lane at every step.
+
+    Attributes:
+        mean: (lanes, steps, n).
+        cov: (lanes, steps, n, n).
+        others: further outputs by name, (lanes, steps, ...): `nis`, `dof`, `loglik`,
+            `innovation`, `variance`, `status`. Outputs that were not asked for are absent.
+        final: the state after the last step.
+    """
+
+    others: dict[str, Array]
+    final: States
+
+    def __getattr__(self, name: str) -> Array:
+        """Outputs by name."""
+        try:
+            return self.__dict__["others"][name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+
+def start_states(start: Gaussian, lanes: int) -> States:
+    """Blocked states from a Gaussian whose leading axis is absent or (lanes,)."""
+    n = np.shape(start.mean)[-1]
+    slots = _state_slots(n)
+    mean = np.broadcast_to(np.asarray(start.mean, dtype=float), (lanes, n))
+    cov = np.broadcast_to(np.asarray(start.cov, dtype=float), (lanes, n, n))
+    return pack_states(slots, {"mean": mean, "cov": cov})
+
+
+def _state_slots(n: int) -> tuple[Any, ...]:
+    from boresight.lanes.program import Slot
+
+    return (Slot("mean", Vector(n)), Slot("cov", Symmetric(n)))
+
+
+def run_recursion(
+    recursion: Recursion,
+    z: Array,
+    dt: Array,
+    start: Gaussian | States,
+    *,
+    outputs: Sequence[str] = ("mean", "cov", "nis"),
+    last: bool = False,
+    threads: int = 1,
+) -> Estimate:
+    """Filter every lane.
+
+    Args:
+        recursion: what to run.
+        z: plots (lanes, steps, k), SI units and radians, NaN where missing.
+        dt: seconds before each step: a number, (1, steps), (lanes, 1) or (lanes, steps).
+        start: Gaussian with mean (n,) or (lanes, n), or states of an earlier call.
+        outputs: which of `OUTPUTS` to write; the rest is not computed.
+        last: write outputs after the last step only.
+        threads: how many threads share the lanes.
+    """
+    z = np.asarray(z, dtype=float)
+    k = len(recursion.sensor.names)
+    if z.ndim != 3 or z.shape[2] != k:
+        raise UsageError(
+            f"plots have shape {z.shape}; (lanes, steps, {k}) is needed",
+            why=f"the sensor measures {', '.join(recursion.sensor.names)}",
+        )
+    unknown = sorted(set(outputs) - set(OUTPUTS))
+    if unknown:
+        raise UsageError(f"no output {unknown[0]!r}", next_step=f"use {', '.join(OUTPUTS)}")
+    given = {"dt": (dt, Scalar())} | recursion.models()
+    rated = {name: rate_of(name, value, leaf) for name, (value, leaf) in given.items()}
+    rates = {name: rate for name, (rate, _) in rated.items()} | {"z": Rate.EACH}
+    when = Rate.LANE if last else Rate.EACH
+    kernel = recursion.kernel(rates, dict.fromkeys(outputs, when))
+    states = start if isinstance(start, States) else start_states(start, z.shape[0])
+    values = {name: value for name, (_, value) in rated.items()} | {"z": z}
+    final, results = kernel.run(states, values, z.shape[1], threads=threads)
+    return Estimate(results, final)

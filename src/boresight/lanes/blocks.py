@@ -1,0 +1,177 @@
+"""Running a program over lanes and steps: blocked state, rows in and out, threads.
+
+State lives in blocks of 8 lanes, [block, number, 8], from one call to the next. Inputs and outputs
+are plain rows, which the kernel packs itself, or blocks where a caller makes data blocked already.
+"""
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import UsageError
+from boresight.lanes.ir import BLOCK
+from boresight.lanes.program import Program, Rate, Slot, run_numpy
+from boresight.lanes.simd import Code, compile_program
+
+Array = Any
+
+
+def to_blocks(rows: Array) -> Array:
+    """(lanes, ..., size) to (blocks, ..., size, 8); the last lane pads its block."""
+    lanes = len(rows)
+    padded = rows[np.minimum(np.arange(-(-lanes // BLOCK) * BLOCK), lanes - 1)]
+    return np.ascontiguousarray(np.moveaxis(padded.reshape(-1, BLOCK, *rows.shape[1:]), 1, -1))
+
+
+def from_blocks(blocks: Array, lanes: int) -> Array:
+    """The inverse of `to_blocks`."""
+    rows = np.moveaxis(blocks, -1, 1)
+    return np.ascontiguousarray(rows.reshape(-1, *rows.shape[2:])[:lanes])
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """The state of many lanes, blocked. Index by leaf name for plain arrays.
+
+    Attributes:
+        slots: the state's leaves, in the order in which they are stored.
+        data: (blocks, numbers, 8), float64, C-contiguous.
+        lanes: number of lanes in use; the last block's spare lanes repeat the last lane.
+    """
+
+    slots: tuple[Slot, ...]
+    data: Array
+    lanes: int
+
+    def __getitem__(self, name: str) -> Array:
+        """Leaf `name` as (lanes, *shape)."""
+        start = 0
+        for slot in self.slots:
+            if slot.name == name:
+                part = self.data[:, start : start + slot.leaf.size]
+                return slot.leaf.unpack(from_blocks(part, self.lanes))
+            start += slot.leaf.size
+        raise KeyError(name)
+
+    @property
+    def rows(self) -> Array:
+        """All leaves, packed: (lanes, numbers)."""
+        return from_blocks(self.data, self.lanes)
+
+
+def pack_states(slots: tuple[Slot, ...], values: Mapping[str, Array]) -> States:
+    """Plain arrays (lanes, *shape), one for each leaf, to blocked state."""
+    rows = np.concatenate([slot.leaf.pack(values[slot.name]) for slot in slots], axis=-1)
+    return States(slots, to_blocks(rows), len(rows))
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """A program ready to run: compiled where it can be, in NumPy where it cannot."""
+
+    program: Program
+    rows: bool
+    code: Code | None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Machine code does not travel; the program does, and is loaded from the cache there."""
+        return make_kernel, (self.program, self.rows)
+
+    def run(
+        self,
+        states: States,
+        inputs: Mapping[str, Array],
+        steps: int,
+        *,
+        threads: int = 1,
+    ) -> tuple[States, dict[str, Array]]:
+        """Run every lane through `steps` steps.
+
+        Args:
+            states: where the lanes start; not changed.
+            inputs: by name: FIXED (*shape), STEP (steps, *shape), LANE (lanes, *shape), EACH
+                (lanes, steps, *shape); LANE and EACH are blocked if the kernel is.
+            steps: number of steps, at least 1.
+            threads: how many threads share the lanes; the result does not depend on it.
+
+        Returns:
+            The new states, and the outputs by name: EACH (lanes, steps, *shape), LANE
+            (lanes, *shape); blocked and packed if the kernel is.
+        """
+        packed = [self._pack(slot, inputs, states.lanes, steps) for slot in self.program.inputs]
+        if self.code is None:
+            return self._run_numpy(states, packed, steps)
+        new = np.empty_like(states.data)
+        outputs = [self._output(slot, states.lanes, steps) for slot in self.program.outputs]
+        arrays = (states.data, new, *packed, *outputs)
+        addresses = [array.ctypes.data for array in arrays]
+        chunks = self.code.chunks(states.lanes)
+        cuts = np.linspace(0, chunks, min(threads, chunks) + 1).astype(int)
+        call = self.code.call
+
+        def part(first: int, last: int) -> None:
+            call(first, last, steps, states.lanes, *addresses)
+
+        if len(cuts) == 2:
+            part(0, chunks)
+        else:
+            list(_pool().map(part, cuts[:-1].tolist(), cuts[1:].tolist()))
+        return States(states.slots, new, states.lanes), self._unpack(outputs)
+
+    def _pack(self, slot: Slot, inputs: Mapping[str, Array], lanes: int, steps: int) -> Array:
+        if slot.name not in inputs:
+            raise UsageError(f"input {slot.name!r} is missing; got {sorted(inputs)}")
+        blocked = not self.rows and slot.rate & Rate.LANE
+        if blocked:
+            return np.ascontiguousarray(inputs[slot.name], dtype=float)
+        array = np.ascontiguousarray(slot.leaf.pack(inputs[slot.name]))
+        sizes = {Rate.FIXED: (), Rate.STEP: (steps,), Rate.LANE: (lanes,)}
+        expected = (*sizes.get(slot.rate, (lanes, steps)), slot.leaf.size)
+        if array.shape != expected:
+            raise UsageError(
+                f"input {slot.name!r} has shape {np.shape(inputs[slot.name])}",
+                why=f"it is declared {slot.rate.name} with {lanes} lanes and {steps} steps",
+            )
+        return array
+
+    def _output(self, slot: Slot, lanes: int, steps: int) -> Array:
+        middle = (steps,) if slot.rate == Rate.EACH else ()
+        if self.rows:
+            return np.empty((lanes, *middle, slot.leaf.size))
+        return np.empty((-(-lanes // BLOCK), *middle, slot.leaf.size, BLOCK))
+
+    def _unpack(self, outputs: list[Array]) -> dict[str, Array]:
+        slots = self.program.outputs
+        if not self.rows:
+            return {slot.name: a for slot, a in zip(slots, outputs, strict=True)}
+        return {slot.name: slot.leaf.unpack(a) for slot, a in zip(slots, outputs, strict=True)}
+
+    def _run_numpy(
+        self, states: States, packed: list[Array], steps: int
+    ) -> tuple[States, dict[str, Array]]:
+        names = [slot.name for slot in self.program.inputs]
+        blocked = [not self.rows and bool(s.rate & Rate.LANE) for s in self.program.inputs]
+        rows = {
+            name: from_blocks(a, states.lanes) if b else a
+            for name, a, b in zip(names, packed, blocked, strict=True)
+        }
+        state, outputs = run_numpy(self.program, states.lanes, steps, states.rows, rows)
+        results = [outputs[slot.name] for slot in self.program.outputs]
+        if not self.rows:
+            results = [to_blocks(a) for a in results]
+        return States(states.slots, to_blocks(state), states.lanes), self._unpack(results)
+
+
+def make_kernel(program: Program, rows: bool = True) -> Kernel:  # noqa: FBT001, FBT002 - pickled
+    """A kernel for this machine; `rows` chooses plain rows or blocks for inputs and outputs."""
+    return Kernel(program, rows, compile_program(program, rows=rows))
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="boresight")

@@ -1,0 +1,347 @@
+"""A recorded formula as a straight-line program: what goes in, what comes out, what varies.
+
+Every input is declared with its rate: fixed for a call, per lane, per step (the same for all
+lanes), or per step and lane. What depends on less is computed less often (hoisted). The program
+runs here in NumPy over lanes, as the oracle of the compiled form and its fallback.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import IntFlag
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import FormulaError, UsageError
+from boresight.lanes.trace import COMPARISONS, FOLD, Graph, Symbol, located
+
+Array = Any
+LARGEST = 8_000  # operations; compile time grows faster than linearly above it
+
+
+class Rate(IntFlag):
+    """How often an input changes; also how often a node must be computed."""
+
+    FIXED = 0
+    STEP = 1
+    LANE = 2
+    EACH = 3
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """Shape of one declared array: `()`, `(n,)` or `(m, n)`; symmetric keeps the upper triangle."""
+
+    shape: tuple[int, ...] = ()
+    symmetric: bool = False
+
+    @property
+    def size(self) -> int:
+        """Numbers kept for one target."""
+        if self.symmetric:
+            return self.shape[0] * (self.shape[0] + 1) // 2
+        return int(np.prod(self.shape))
+
+    def build(self, numbers: Sequence[Any]) -> Any:
+        """The array (or scalar) of `size` numbers, floats or symbols, for one target."""
+        if not self.shape:
+            return numbers[0]
+        flat = np.array(list(numbers))
+        return flat[_mirror(self.shape[0])] if self.symmetric else flat.reshape(self.shape)
+
+    def flatten(self, value: Any) -> list[Any]:
+        """The inverse of `build`."""
+        array = np.asarray(value)
+        if array.shape != self.shape:
+            raise UsageError(f"declared shape {self.shape}, but the formula gave {array.shape}")
+        return list(array[np.triu_indices(self.shape[0])] if self.symmetric else array.ravel())
+
+    def pack(self, values: Array) -> Array:
+        """(lanes, *shape) to (lanes, size)."""
+        values = np.asarray(values, dtype=float)
+        if self.symmetric:
+            return values[(..., *np.triu_indices(self.shape[0]))]
+        return values.reshape(*values.shape[: values.ndim - len(self.shape)], self.size)
+
+    def unpack(self, rows: Array) -> Array:
+        """(..., size) to (..., *shape)."""
+        if self.symmetric:
+            return rows[..., _mirror(self.shape[0])]
+        return rows.reshape(*rows.shape[:-1], *self.shape)
+
+
+def _mirror(n: int) -> Array:
+    """Positions of the full (n, n) matrix within the packed upper triangle."""
+    index = np.zeros((n, n), dtype=int)
+    rows, columns = np.triu_indices(n)
+    index[rows, columns] = index[columns, rows] = np.arange(len(rows))
+    return index
+
+
+def Scalar() -> Leaf:
+    """One number."""
+    return Leaf()
+
+
+def Vector(n: int) -> Leaf:
+    """An array (n,)."""
+    return Leaf((n,))
+
+
+def Matrix(m: int, n: int) -> Leaf:
+    """An array (m, n)."""
+    return Leaf((m, n))
+
+
+def Symmetric(n: int) -> Leaf:
+    """A symmetric array (n, n), kept as its upper triangle."""
+    return Leaf((n, n), symmetric=True)
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A named leaf of the program with its rate; an output of rate LANE keeps the last step's."""
+
+    name: str
+    leaf: Leaf
+    rate: Rate = Rate.EACH
+
+
+@dataclass(frozen=True)
+class Program:
+    """A straight-line program; nodes are in the order in which they were recorded.
+
+    Attributes:
+        nodes: (operation, arguments); arguments are node numbers, except for constants and inputs.
+        rates: how often each node must be computed.
+        inputs: declared inputs.
+        state: what travels from step to step, per lane.
+        outputs: what is written, each step (rate EACH) or after the last (rate LANE).
+        state_nodes: nodes of the new state, in the order of the flattened state.
+        output_nodes: nodes of each output.
+    """
+
+    nodes: tuple[tuple[str, tuple[Any, ...]], ...]
+    rates: tuple[Rate, ...]
+    inputs: tuple[Slot, ...]
+    state: tuple[Slot, ...]
+    outputs: tuple[Slot, ...]
+    state_nodes: tuple[int, ...]
+    output_nodes: tuple[tuple[int, ...], ...]
+
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations of one step and lane; hoisted work is not counted."""
+        return sum(
+            rate == Rate.EACH and op not in ("const", "input")
+            for (op, _), rate in zip(self.nodes, self.rates, strict=True)
+        )
+
+    @property
+    def state_size(self) -> int:
+        """Numbers of state per lane."""
+        return sum(slot.leaf.size for slot in self.state)
+
+    @property
+    def digest(self) -> str:
+        """Identity of the program: equal digests mean equal programs."""
+        return hashlib.sha256(repr(self).encode()).hexdigest()
+
+    def __str__(self) -> str:
+        """The program as text, one operation a line."""
+        lines = []
+        for i, ((op, args), rate) in enumerate(zip(self.nodes, self.rates, strict=True)):
+            if op == "const":
+                text = repr(np.frombuffer(args[0])[0].item())
+            elif op == "input":
+                text = f"{args[0]}[{args[1]}]"
+            else:
+                text = f"{op} " + ", ".join(f"%{a}" for a in args)
+            lines.append(f"%{i} = {text}  # {rate.name}")
+        for slot, numbers in zip(self.outputs, self.output_nodes, strict=True):
+            lines.append(f"{slot.name} = " + ", ".join(f"%{n}" for n in numbers))
+        return "\n".join(lines)
+
+
+def _declare(graph: Graph, slot: Slot) -> Any:
+    return slot.leaf.build([graph.input(slot.name, i) for i in range(slot.leaf.size)])
+
+
+def trace(
+    step: Callable[[dict[str, Any], dict[str, Any]], tuple[Mapping[str, Any], Mapping[str, Any]]],
+    *,
+    state: Mapping[str, Leaf],
+    inputs: Mapping[str, tuple[Leaf, Rate]],
+    outputs: Mapping[str, tuple[Leaf, Rate]],
+) -> Program:
+    """Record `step(state, inputs) -> (new state, outputs)`, a formula for one target.
+
+    Args:
+        step: called once, with dictionaries of arrays of symbols.
+        state: what travels from step to step.
+        inputs: leaf and rate of every input.
+        outputs: leaf and rate of the outputs the caller wants; others are not computed.
+
+    Returns:
+        The program, without operations that nothing wanted needs.
+
+    Raises:
+        FormulaError: the formula does something that cannot be recorded; names file and line.
+    """
+    graph = Graph()
+    slots = tuple(Slot(name, leaf, rate) for name, (leaf, rate) in inputs.items())
+    states = tuple(Slot(name, leaf) for name, leaf in state.items())
+    try:
+        new_state, results = step(
+            {s.name: _declare(graph, replace(s, name=f"state.{s.name}")) for s in states},
+            {s.name: _declare(graph, s) for s in slots},
+        )
+    except FormulaError:
+        raise
+    except (TypeError, ValueError, ArithmeticError, AttributeError, np.linalg.LinAlgError) as error:
+        raise located(error) from error
+    wanted = tuple(Slot(name, leaf, rate) for name, (leaf, rate) in outputs.items())
+    program = assemble(
+        graph,
+        slots,
+        states,
+        wanted,
+        [n for s in states for n in _nodes(graph, s, new_state)],
+        [_nodes(graph, s, results) for s in wanted],
+    )
+    if program.operations > LARGEST:
+        raise FormulaError(
+            f"the formula has {program.operations} operations; a kernel has at most {LARGEST}",
+            next_step="shorten its longest loop (iterations, sigma points) or split the method",
+        )
+    return program
+
+
+def _nodes(graph: Graph, slot: Slot, values: Mapping[str, Any]) -> list[int]:
+    if slot.name not in values:
+        raise UsageError(f"the formula has no output {slot.name!r}; it has {sorted(values)}")
+    return [
+        v.index if isinstance(v, Symbol) else graph.constant(v).index
+        for v in slot.leaf.flatten(values[slot.name])
+    ]
+
+
+def assemble(
+    graph: Graph,
+    inputs: tuple[Slot, ...],
+    state: tuple[Slot, ...],
+    outputs: tuple[Slot, ...],
+    state_nodes: list[int],
+    output_nodes: list[list[int]],
+) -> Program:
+    """Drop what nothing needs, renumber, and find how often each node must be computed."""
+    needed = set(state_nodes).union(*output_nodes)
+    for i in range(len(graph.nodes) - 1, -1, -1):
+        op, args = graph.nodes[i]
+        if i in needed and op not in ("const", "input"):
+            needed.update(args)
+    order = sorted(needed)
+    number = {old: new for new, old in enumerate(order)}
+    declared = {s.name: s.rate for s in inputs}
+    nodes: list[tuple[str, tuple[Any, ...]]] = []
+    rates: list[Rate] = []
+    for old in order:
+        op, args = graph.nodes[old]
+        rate = Rate.FIXED
+        if op == "input":
+            rate = declared.get(args[0], Rate.EACH)
+        elif op != "const":
+            args = tuple(number[a] for a in args)
+            for a in args:
+                rate |= rates[a]
+        nodes.append((op, args))
+        rates.append(rate)
+    return Program(
+        tuple(nodes),
+        tuple(rates),
+        inputs,
+        state,
+        outputs,
+        tuple(number[n] for n in state_nodes),
+        tuple(tuple(number[n] for n in numbers) for numbers in output_nodes),
+    )
+
+
+def is_condition(op: str) -> bool:
+    """Whether an operation yields a condition rather than a number."""
+    return op in COMPARISONS
+
+
+def run_numpy(
+    program: Program,
+    lanes: int,
+    steps: int,
+    state: Array,
+    inputs: Mapping[str, Array],
+) -> tuple[Array, dict[str, Array]]:
+    """Run in NumPy over lanes.
+
+    Args:
+        program: what to run.
+        lanes: number of lanes.
+        steps: number of steps.
+        state: (lanes, state_size), the flattened state; not changed.
+        inputs: by name, packed: FIXED (size,), STEP (steps, size), LANE (lanes, size),
+            EACH (lanes, steps, size).
+
+    Returns:
+        The new state, and by name the outputs: EACH (lanes, steps, size), LANE (lanes, size).
+    """
+    state = np.array(state, dtype=float)
+    shapes = {Rate.EACH: (lanes, steps), Rate.LANE: (lanes,)}
+    outputs = {s.name: np.empty((*shapes[s.rate], s.leaf.size)) for s in program.outputs}
+    memory: list[Any] = [None] * len(program.nodes)
+    with np.errstate(all="ignore"):
+        for rate in (Rate.FIXED, Rate.LANE):
+            _evaluate(program, memory, {rate}, inputs, state, 0)
+        for t in range(steps):
+            _evaluate(program, memory, {Rate.STEP, Rate.EACH}, inputs, state, t)
+            for slot, numbers in zip(program.outputs, program.output_nodes, strict=True):
+                target = outputs[slot.name]
+                for k, n in enumerate(numbers):
+                    (target[:, t] if slot.rate == Rate.EACH else target)[:, k] = memory[n]
+            state = (
+                np.stack([np.broadcast_to(memory[n], lanes) for n in program.state_nodes], axis=-1)
+                if program.state_nodes
+                else state
+            )
+    return state, outputs
+
+
+def _evaluate(
+    program: Program,
+    memory: list[Any],
+    rates: set[Rate],
+    inputs: Mapping[str, Array],
+    state: Array,
+    t: int,
+) -> None:
+    offsets = _state_offsets(program)
+    declared = {s.name: s.rate for s in program.inputs}
+    for i, ((op, args), rate) in enumerate(zip(program.nodes, program.rates, strict=True)):
+        if rate not in rates:
+            continue
+        if op == "const":
+            memory[i] = np.frombuffer(args[0])[0]
+        elif op != "input":
+            memory[i] = FOLD[op](*(memory[a] for a in args))
+        elif args[0] in offsets:
+            memory[i] = state[:, offsets[args[0]] + args[1]]
+        else:
+            where = {Rate.FIXED: (), Rate.STEP: (t,), Rate.LANE: (slice(None),)}
+            place = where.get(declared[args[0]], (slice(None), t))
+            memory[i] = inputs[args[0]][(*place, args[1])]
+
+
+def _state_offsets(program: Program) -> dict[str, int]:
+    offsets, total = {}, 0
+    for slot in program.state:
+        offsets[f"state.{slot.name}"] = total
+        total += slot.leaf.size
+    return offsets

@@ -1,0 +1,137 @@
+"""Sensors: what they measure, how well, and from where. Arguments name their units.
+
+A sensor is frozen data. `components(motion)` gives the formulas of what it measures, in the order
+in which a plot `z` holds them: range, azimuth, elevation, height, range rate, those that it has.
+A plot is an array (k,), SI units and radians, NaN where a component was not measured.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import UsageError
+from boresight.maths.frames import Site, ellipsoid_height
+from boresight.models.components import FORMULAS, Component
+from boresight.models.motion import Motion
+
+Array = Any
+_RADIANS = np.pi / 180.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pose:
+    """Where a sensor stands in the track frame, how it is turned, and how it moves.
+
+    Attributes:
+        position_m: (3,), in the track frame.
+        rotation: (3, 3); rows are the sensor's axes in the track frame.
+        velocity_mps: (3,), in the track frame.
+
+    Each may have leading axes (lanes, steps): a moving platform is a pose for every step.
+    """
+
+    position_m: Array = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
+    rotation: Array = field(default_factory=lambda: np.eye(3), metadata={"shape": (3, 3)})
+    velocity_mps: Array = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Radar:
+    """A radar; its arguments are the standard deviations of what it measures.
+
+    Attributes:
+        range_m: slant range, m; None for a sensor that measures no range.
+        azimuth_deg: azimuth, degrees.
+        elevation_deg: elevation, degrees; None where it is not measured.
+        height_m: reported height above the ellipsoid, m; needs `site`.
+        range_rate_mps: range rate, m/s, positive when opening.
+        pose: None for a fixed radar at the origin of the track frame, along its axes.
+        site: place of the track frame's origin; needed only for `height_m`. The frame is then
+            x = North, y = East, z = up.
+    """
+
+    range_m: Any = None
+    azimuth_deg: Any = None
+    elevation_deg: Any = None
+    height_m: Any = None
+    range_rate_mps: Any = None
+    pose: Pose | None = None
+    site: Site | None = None
+
+    def __post_init__(self) -> None:
+        """Numbers become floats or arrays, and are checked."""
+        for name in ("range_m", "azimuth_deg", "elevation_deg", "height_m", "range_rate_mps"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _sigma(name, value))
+        if self.height_m is not None and self.site is None:
+            raise UsageError(
+                "a radar with height_m needs a site",
+                why="height above the ellipsoid depends on where the frame's origin is",
+                next_step="pass site=Site(latitude_deg=..., longitude_deg=..., height_m=...)",
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What a plot of this sensor holds, in order."""
+        given = {
+            "range_m": self.range_m,
+            "azimuth_rad": self.azimuth_deg,
+            "elevation_rad": self.elevation_deg,
+            "height_m": self.height_m,
+            "range_rate_mps": self.range_rate_mps,
+        }
+        return tuple(name for name, sigma in given.items() if sigma is not None)
+
+    def components(self, motion: Motion) -> tuple[Component, ...]:
+        """The formulas of what is measured, for states of `motion`."""
+        return tuple(self._component(name, motion) for name in self.names)
+
+    def _component(self, name: str, motion: Motion) -> Component:
+        if name == "height_m":
+            return Component(name, self._height(motion.dims), self.height_m)
+        formula, sigma = FORMULAS[name], getattr(self, name.replace("_rad", "_deg"))
+        if name.endswith("_rad"):
+            sigma = sigma * _RADIANS
+
+        def value(state: Array) -> Any:
+            return formula(*self.relative(state, motion.dims))
+
+        return Component(name, value, sigma)
+
+    def relative(self, state: Array, dims: int) -> tuple[Array, Array]:
+        """Position and velocity (dims,) relative to the sensor, in the sensor's frame."""
+        p = state[:dims]
+        v = state[dims : 2 * dims] if len(state) >= 2 * dims else p * 0.0
+        if self.pose is None:
+            return p, v
+        turn = self.pose.rotation[:dims, :dims]
+        return (
+            turn @ (p - self.pose.position_m[:dims]),
+            turn @ (v - self.pose.velocity_mps[:dims]),
+        )
+
+    def _height(self, dims: int) -> Callable[[Array], Any]:
+        def value(state: Array) -> Any:
+            north, east, up = state[:dims]
+            return ellipsoid_height(east, north, up, self.site)  # type: ignore[arg-type]
+
+        return value
+
+
+def _sigma(name: str, value: Any) -> Any:
+    sigma = float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
+    if not np.all(np.asarray(sigma) > 0):
+        raise UsageError(
+            f"{name}={value!r} is not a standard deviation",
+            why="it must be positive",
+            next_step=f"leave {name} out if the sensor does not measure it",
+        )
+    return sigma
+
+
+def Bearings(*, azimuth_deg: Any, pose: Pose | None = None) -> Radar:
+    """A passive sensor that measures bearings only (degrees, standard deviation)."""
+    return Radar(azimuth_deg=azimuth_deg, pose=pose)
