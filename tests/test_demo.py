@@ -1,0 +1,264 @@
+"""The shipped recording reads back: counts, physics, and the errors that were planted in it."""
+
+import json
+from importlib.resources import files
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy.interpolate import CubicSpline
+
+from boresight.experiments import demo
+from boresight.experiments.truth import Motion, Truth
+from boresight.formats.asterix import decode
+from boresight.formats.specs import edition
+from boresight.maths import frames
+
+MB = 1e6
+FOLDER = files("boresight") / "demo"
+FACTS = json.loads((FOLDER / "facts.json").read_text(encoding="utf-8"))
+RADAR = FACTS["radar"]
+SITE = frames.Site(**FACTS["site"])
+NM = 1852.0
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return demo.shipped()[1]
+
+
+def test_what_is_shipped_is_small_and_says_that_it_is_invented():
+    sizes = [(FOLDER / name).stat().st_size for name in ("recording.ast", "truth.parquet")]
+    assert sum(sizes) < 1.5 * MB
+    assert "invented" in FACTS["about"]
+    addresses = [flight["address"] for flight in FACTS["flights"] if flight["address"]]
+    assert all(0xF00000 <= int(address, 16) < 0xF00100 for address in addresses)
+    assert 40 <= len(FACTS["flights"]) <= 60
+
+
+def test_truth_is_the_cubic_through_its_knots():
+    """A cubic motion is given back exactly, at and between uneven knots, and nowhere else."""
+    coefficients = np.array(
+        [[3.0, -2.0, 5.0], [200.0, 90.0, -4.0], [1.5, -2.0, 0.1], [0.1, 0, 0.01]]
+    )
+
+    def motion(time):
+        powers = (time - 10.0)[:, None] ** np.arange(4)
+        rates = np.arange(4) * (time - 10.0)[:, None] ** np.maximum(np.arange(4) - 1, 0)
+        return powers @ coefficients, rates @ coefficients
+
+    knots = np.array([10.0, 12.0, 20.0, 21.0])
+    names = ["east_m", "north_m", "up_m", "east_mps", "north_mps", "up_mps"]
+    table = pl.DataFrame(np.hstack(motion(knots)), schema=names)
+    table = table.with_columns(time_s=knots, flight=pl.lit(0))
+    two = Truth(pl.concat([table, table.with_columns(pl.lit(1).alias("flight"))]))
+    time = np.array([10.0, 11.0, 12.0, 17.3, 20.9])
+    for flight in (0, 1):
+        found = two.at(np.full(5, flight), time)
+        np.testing.assert_allclose(found.position, motion(time)[0], atol=1e-6)
+        np.testing.assert_allclose(found.velocity, motion(time)[1], atol=1e-6)
+    outside = two.at(np.array([0, 0, 1, 1]), np.array([9.9, 21.1, 9.9, 21.1]))
+    assert np.isnan(outside.position).all()
+
+
+def test_no_flight_does_what_an_aircraft_cannot(truth):
+    """Speeds, climbs and accelerations by differences of the truth at 1 s."""
+    for flight in range(len(FACTS["flights"])):
+        knots = truth.knots.filter(flight=flight)["time_s"]
+        time = np.arange(np.ceil(knots[0]), knots[-1] - 1e-3)
+        motion = truth.at(np.full(len(time), flight), time)
+        ground_speed = np.hypot(motion.velocity[:, 0], motion.velocity[:, 1])
+        acceleration = np.diff(motion.velocity, axis=0)
+        differences = np.diff(motion.position, axis=0)
+        halfway = (motion.velocity[1:] + motion.velocity[:-1]) / 2
+        assert ground_speed.min() > 40
+        assert ground_speed.max() < 270
+        assert np.linalg.norm(acceleration, axis=1).max() < 9.81 * np.tan(np.radians(46))
+        np.testing.assert_allclose(differences, halfway, atol=0.5)  # jerk/12 for a second
+        height = frames.ellipsoid_height(*motion.position.T, SITE)
+        assert height.min() > 150
+        assert height.max() < 13_000
+
+
+def blocks(category):
+    """Start and end of the file's blocks of a category: category octet, then a length of two."""
+    octets = np.frombuffer((FOLDER / "recording.ast").read_bytes(), np.uint8)
+    found, at = [], 0
+    while at < len(octets):
+        length = int(octets[at + 1]) * 256 + int(octets[at + 2])
+        if octets[at] == category:
+            found.append((at, at + length))
+        at += length
+    assert at == len(octets)
+    starts, ends = np.array(found).T
+    return octets, starts, ends
+
+
+@pytest.fixture(scope="module")
+def records():
+    editions = {category: FACTS["editions"][f"cat{category:03d}"] for category in (21, 34, 48)}
+    return {
+        category: decode(*blocks(category), edition(category, name))
+        for category, name in editions.items()
+    }
+
+
+def one_a_scan(records):
+    """Plots with an address, one a scan: where two stand in one scan, none."""
+    plots = pl.DataFrame(
+        {
+            "time_s": records.value("140"),
+            "address": records.raw("220", absent=-1),
+            "type": records.raw("020/TYP"),
+            "monitor": records.raw("020/RAB"),
+            "range_m": records.value("040/RHO") * NM,
+            "azimuth_deg": records.value("040/THETA"),
+        }
+    )
+    plots = plots.filter(pl.col("address") >= 0, pl.col("type") > 0, monitor=0)
+    plots = plots.sort("address", "time_s")
+    before = pl.col("time_s").diff().over("address").fill_null(4.0)
+    after = before.shift(-1).over("address").fill_null(4.0)
+    return plots.filter(before > 2, after > 2)
+
+
+def test_counts_are_those_stated(records):
+    counts = FACTS["counts"]
+    plots = records[48]
+    for category in (21, 34, 48):
+        assert len(records[category]) == counts[f"cat{category:03d}"]
+        assert records[category].is_good.all()
+    types = plots.raw("020/TYP")
+    assert (types == 1).sum() == counts["clutter"]
+    assert (types == 0).sum() == counts["coasted"]
+    assert plots.raw("020/RAB").sum() == counts["monitor"]
+    assert plots.flag("070/G").sum() == counts["mode_a_garbled"]
+    assert plots.flag("090/G").sum() == counts["level_garbled"]
+    other = counts["aircraft"] + counts["split"] + counts["reflection"]
+    assert len(plots) == other + counts["clutter"] + counts["coasted"] + counts["monitor"]
+    addresses = set(plots.raw("220", absent=-1).tolist()) - {-1}
+    with_mode_s = [flight for flight in FACTS["flights"] if flight["address"]]
+    assert len(addresses) == len(with_mode_s) + 1  # and the monitor
+
+
+def test_sectors_come_in_turn_and_their_plots_lie_in_them(records):
+    service = records[34]
+    sector = service.value("020")
+    np.testing.assert_allclose(sector, np.arange(len(sector)) % 32 * 11.25)
+    np.testing.assert_array_equal(service.raw("000"), np.where(sector == 0, 1, 2))
+    time = service.value("030") - FACTS["epoch_s"] - RADAR["time_bias_s"]
+    np.testing.assert_allclose(time, np.arange(len(sector)) / 8, atol=1 / 250)
+    assert service.has("050/MDS").sum() == RADAR["scans"]
+    np.testing.assert_array_equal(np.unique(service.value("120/LAT")[sector == 0]), 47.8125)
+    np.testing.assert_array_equal(np.unique(service.value("120/LON")[sector == 0]), 1.40625)
+    plots = records[48]
+    beam = (plots.value("140") - FACTS["epoch_s"] - RADAR["time_bias_s"]) / RADAR["scan_s"] * 360
+    off = (plots.value("040/THETA") - beam + 180) % 360 - 180
+    assert np.abs(off).max() < 5 * RADAR["azimuth_noise_deg"] + 0.75  # splits are up to 0.6 off
+
+
+def test_two_share_a_mode_a_code_and_one_changes_its(records):
+    plots = records[48]
+    clear = (plots.raw("220", absent=-1) >= 0) & ~plots.flag("070/G") & plots.has("070")
+    pairs = np.stack([plots.raw("220"), plots.raw("070/MODE3A")], axis=1)[clear]
+    codes, addresses = np.unique(pairs, axis=0)[:, 1], np.unique(pairs, axis=0)[:, 0]
+    assert (np.unique(codes, return_counts=True)[1] > 1).sum() == 1
+    assert (np.unique(addresses, return_counts=True)[1] > 1).sum() == 1
+    assert 0o6543 in codes
+    without = plots.has("070") & ~plots.has("220")
+    assert len(np.unique(plots.raw("070/MODE3A")[without & ~plots.flag("070/G")])) == 1
+
+
+def excess(range_m, height_m):
+    """The air's delay by plain summation along a straight line over a round Earth."""
+    air, earth = RADAR["atmosphere"], 6.371e6
+    start, end = earth + SITE.height_m, earth + height_m
+    sine = (end**2 - start**2 - range_m**2) / (2 * range_m * start)
+    along = (np.arange(200) + 0.5) / 200 * range_m[:, None]
+    radius = np.sqrt(start**2 + along**2 + 2 * start * along * sine[:, None])
+    index = air["surface_refractivity"] * np.exp(-(radius - earth) / air["scale_height_m"])
+    return 1e-6 * index.mean(axis=1) * range_m
+
+
+def design(plots, motion):
+    """Residuals of range and azimuth, and their slopes in range, azimuth and time bias."""
+    polar = frames.polar_from_enu(motion.position)
+    east, north, _ = motion.position.T
+    closing = np.sum(motion.position * motion.velocity, axis=1) / polar.range_m
+    turning = (motion.velocity[:, 0] * north - motion.velocity[:, 1] * east) / (east**2 + north**2)
+    height = frames.ellipsoid_height(*motion.position.T, SITE)
+    range_left = plots["range_m"] - polar.range_m - excess(polar.range_m, height)
+    azimuth_left = np.radians(plots["azimuth_deg"].to_numpy()) - polar.azimuth
+    azimuth_left = np.degrees((azimuth_left + np.pi) % (2 * np.pi) - np.pi)
+    zero, one = np.zeros(len(plots)), np.ones(len(plots))
+    in_range = np.stack([one, zero, -closing], axis=1)
+    in_azimuth = np.stack([zero, one, -np.degrees(turning)], axis=1)
+    return (range_left.to_numpy(), in_range), (azimuth_left, in_azimuth)
+
+
+def solve(plots, motion):
+    """Weighted least squares; standard errors by the scatter of whole aircraft (sandwich)."""
+    (r, A), (a, B) = design(plots, motion)
+    sane = (np.abs(r - np.median(r)) < 200) & (np.abs(a - np.median(a)) < 0.5)
+    sd_r, sd_a = np.std(r[sane]), np.std(a[sane])
+    for _ in range(3):
+        y = np.concatenate([r[sane] / sd_r, a[sane] / sd_a])
+        X = np.concatenate([A[sane] / sd_r, B[sane] / sd_a])
+        estimate = np.linalg.solve(X.T @ X, X.T @ y)
+        left = y - X @ estimate
+        half = len(left) // 2
+        sd_r, sd_a = sd_r * np.std(left[:half]), sd_a * np.std(left[half:])
+    flights = np.tile(plots["flight"].to_numpy()[sane], 2)
+    scores = X * left[:, None]
+    by_flight = np.stack([scores[flights == f].sum(axis=0) for f in np.unique(flights)])
+    inverse = np.linalg.inv(X.T @ X)
+    spread = np.sqrt(np.diag(inverse @ by_flight.T @ by_flight @ inverse))
+    return estimate, spread, (sd_r, sd_a), half
+
+
+def flight_numbers(plots):
+    numbers = {int(f["address"], 16): i for i, f in enumerate(FACTS["flights"]) if f["address"]}
+    keys = pl.DataFrame({"address": list(numbers), "flight": list(numbers.values())})
+    return plots.join(keys, on="address", maintain_order="left")
+
+
+def test_planted_biases_and_noise_come_back_against_the_truth(records, truth):
+    plots = flight_numbers(one_a_scan(records[48]))
+    delays = np.array([flight["transponder_delay_m"] for flight in FACTS["flights"]])
+    plots = plots.with_columns(pl.col("range_m") - delays[plots["flight"].to_numpy()])
+    motion = truth.at(plots["flight"].to_numpy(), plots["time_s"].to_numpy())
+    estimate, spread, noise, count = solve(plots, motion)
+    planted = [RADAR["range_bias_m"], RADAR["azimuth_bias_deg"], RADAR["time_bias_s"]]
+    assert count > 8_000
+    np.testing.assert_array_less(np.abs(estimate - planted), 3 * spread)
+    np.testing.assert_array_less(spread, [0.5, 0.0015, 0.004])
+    quantum = np.array([NM / 256, 360 / 65_536]) / np.sqrt(12)
+    expected = np.hypot([RADAR["range_noise_m"], RADAR["azimuth_noise_deg"]], quantum)
+    np.testing.assert_allclose(noise, expected, rtol=3 / np.sqrt(2 * count))
+
+
+def test_planted_biases_come_back_against_the_adsb_reports(records):
+    """The reports that state their time and are accurate, between neighbours at most 5 s apart."""
+    heard, plots = records[21], flight_numbers(one_a_scan(records[48]))
+    good = heard.has("071") & (heard.raw("090/NACP") >= 8)
+    place = frames.enu_from_geodetic(
+        heard.value("131/LAT"), heard.value("131/LON"), heard.value("140") * 0.3048, SITE
+    )
+    parts, motions = [], []
+    for (address,), mine in plots.group_by("address", maintain_order=True):
+        rows = good & (heard.raw("080") == address)
+        if rows.sum() < 30:
+            continue
+        time = heard.value("071")[rows]
+        path = CubicSpline(time, place[rows])
+        asked = mine["time_s"].to_numpy()
+        after = np.clip(np.searchsorted(time, asked), 1, len(time) - 1)
+        near = (asked > time[0]) & (asked < time[-1]) & (time[after] - time[after - 1] < 5)
+        parts.append(mine.filter(near))
+        motions.append(np.hstack([path(asked[near]), path(asked[near], 1)]))
+    states = np.concatenate(motions)
+    estimate, spread, _, count = solve(pl.concat(parts), Motion(states[:, :3], states[:, 3:]))
+    planted = [RADAR["range_bias_m"], RADAR["azimuth_bias_deg"], RADAR["time_bias_s"]]
+    assert count > 6_000
+    np.testing.assert_array_less(np.abs(estimate - planted), 3 * spread)
+    np.testing.assert_array_less(spread, [2.5, 0.0015, 0.004])
