@@ -11,17 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from boresight.filters import kalman
 from boresight.filters.posterior import Posterior, innovation, tally
-from boresight.maths import (
-    Gaussian,
-    cholesky,
-    gradient,
-    joseph,
-    lower_solve,
-    mirror,
-    select,
-    upper_solve,
-)
+from boresight.maths import Gaussian, gradient, mirror, select
 from boresight.models.components import Component
 
 Array = Any
@@ -132,21 +124,8 @@ def update(prior: Gaussian, z: Array, components: Sequence[Component]) -> Poster
         z: plot (k,), NaN where missing.
         components: what the plot measures.
     """
-    return condition_block(prior, *linearise(components, z, prior.mean))
-
-
-def condition_block(prior: Gaussian, nu: Array, H: Array, noise: Array, seen: Array) -> Posterior:
-    """The joint update from innovations nu (k,), gradients H (k, n) and noise variances (k,)."""
-    mean, cov = prior
-    R = np.diag(noise)
-    S = mirror(H @ cov @ H.T + R)
-    L, inverse = cholesky(S)
-    K = upper_solve(L, inverse, lower_solve(L, inverse, H @ cov)).T
-    white = lower_solve(L, inverse, nu)
-    # A missing row has S = 1 and nu = 0: it adds nothing to either sum.
-    totals = tally(list(seen), list(white * white), [-2.0 * np.log(i) for i in inverse])
-    variances = np.array([select(t < 0.5, np.nan, S[i, i]) for i, t in enumerate(seen)])
-    return Posterior(mean + K @ nu, joseph(cov, K, H, R), *totals, nu, variances)
+    nu, H, noise, seen = linearise(components, z, prior.mean)
+    return kalman.condition(prior, nu, H, np.diag(noise), seen)
 
 
 def update_iterated(
@@ -167,7 +146,7 @@ def update_iterated(
     for _ in range(iterations - 1):
         nu, H, noise, seen = linearise(components, z, post.mean)
         moved = nu - H @ (prior.mean - post.mean)
-        post = condition_block(prior, moved, H, noise, seen)
+        post = kalman.condition(prior, moved, H, np.diag(noise), seen)
     return Posterior(
         post.mean, post.cov, first.nis, first.dof, first.loglik, first.innovation, first.variance
     )

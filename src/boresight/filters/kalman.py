@@ -6,11 +6,25 @@ Differs from it: the prediction takes any motion, whose Jacobian is found by dua
 linear motion that is the transition matrix itself); the update is in Joseph's form.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from boresight.maths import Gaussian, jacobian, joseph, mirror, missing, select, solve
+from boresight.filters.posterior import Posterior, tally
+from boresight.maths import (
+    Gaussian,
+    cholesky,
+    gradient,
+    jacobian,
+    joseph,
+    lower_solve,
+    mirror,
+    missing,
+    select,
+    upper_solve,
+)
+from boresight.models.components import Component
 from boresight.models.motion import Motion
 
 Array = Any
@@ -31,7 +45,7 @@ def predict(prior: Gaussian, motion: Motion, dt: Any) -> Gaussian:
     return Gaussian(moved, mirror(F @ prior.cov @ F.T + motion.noise(dt)))
 
 
-def update(prior: Gaussian, z: Array, H: Array, R: Array) -> Gaussian:
+def update(prior: Gaussian, z: Array, H: Array, R: Array) -> Posterior:
     """Condition on a linear measurement z = H x + noise.
 
     Args:
@@ -44,13 +58,51 @@ def update(prior: Gaussian, z: Array, H: Array, R: Array) -> Gaussian:
         kashyap (8), in Joseph's form; missing rows change nothing.
     """
     k = len(z)
-    gone = np.array([missing(component) for component in z])
-    rows = np.array([[select(g, h * 0.0, h) for h in row] for g, row in zip(gone, H, strict=True)])
-    eye = np.eye(k)
+    gone = [missing(component) for component in z]
+    seen = np.array([select(g, 0.0, 1.0) for g in gone])
+    rows = np.array([h * there for h, there in zip(H, seen, strict=True)])
+    # A missing row becomes a measurement of nothing with variance 1: it moves nothing.
     noise = np.array(
-        [[select(gone[i] | gone[j], eye[i, j], R[i, j]) for j in range(k)] for i in range(k)]
+        [
+            [R[i, j] * seen[i] * seen[j] + (i == j) * (1.0 - seen[i]) for j in range(k)]
+            for i in range(k)
+        ]
     )
-    residual = select(gone, 0.0, z) - rows @ prior.mean
-    S = rows @ prior.cov @ rows.T + noise
-    K = solve(mirror(S), rows @ prior.cov).T
-    return Gaussian(prior.mean + K @ residual, joseph(prior.cov, K, rows, noise))
+    nu = np.array([select(g, 0.0, value) for g, value in zip(gone, z, strict=True)])
+    return condition(prior, nu - rows @ prior.mean, rows, noise, seen)
+
+
+def condition(prior: Gaussian, nu: Array, H: Array, R: Array, seen: Array) -> Posterior:
+    """The joint update that every block filter ends in; Joseph's form.
+
+    Args:
+        prior: mean (n,), cov (n, n).
+        nu: (k,) innovations, 0 where missing.
+        H: (k, n) gradients, 0 where missing.
+        R: (k, k) noise covariance, rows of the identity where missing.
+        seen: (k,) 1 where measured, else 0.
+    """
+    mean, cov = prior
+    S = mirror(H @ cov @ H.T + R)
+    L, inverse = cholesky(S)
+    K = upper_solve(L, inverse, lower_solve(L, inverse, H @ cov)).T
+    white = lower_solve(L, inverse, nu)
+    # A missing row has S = 1 and nu = 0: it adds nothing to either sum.
+    totals = tally(list(seen), list(white * white), [-2.0 * np.log(i) for i in inverse])
+    variances = np.array([select(t < 0.5, np.nan, S[i, i]) for i, t in enumerate(seen)])
+    return Posterior(mean + K @ nu, joseph(cov, K, H, R), *totals, nu, variances)
+
+
+def update_plot(prior: Gaussian, z: Array, components: Sequence[Component]) -> Posterior:
+    """Condition on a plot whose components are linear in the state (coordinates).
+
+    Args:
+        prior: predicted mean (n,), cov (n, n).
+        z: plot (k,), NaN where missing.
+        components: what the plot measures; gradients are taken at the prediction.
+    """
+    pairs = [gradient(component.value, prior.mean) for component in components]
+    H = np.array([h for _, h in pairs])
+    offset = np.array([value - h @ prior.mean for value, h in pairs])
+    R = np.diag(np.array([component.sigma * component.sigma for component in components]))
+    return update(prior, z - offset, H, R)

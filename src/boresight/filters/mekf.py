@@ -19,10 +19,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from boresight.filters import kalman
 from boresight.filters.ekf import (
     ANGLES_FIRST,
     Correction,
-    condition_block,
     linearise,
     update_sequential,
 )
@@ -102,7 +102,7 @@ def update_block(
             shift, extra = _curvature(z, components, prior.mean, distance)
             nu[i] = nu[i] - (shift * seen[i] if mu else 0.0)
             noise[i] = noise[i] + (extra * seen[i] if added_variance else 0.0)
-    return condition_block(prior, nu, H, noise, seen)
+    return kalman.condition(prior, nu, H, np.diag(noise), seen)
 
 
 def update(

@@ -31,11 +31,12 @@ from boresight.lanes import (
 from boresight.maths import Gaussian, select
 from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, structure, with_numbers
-from boresight.models.sensors import Radar
+from boresight.models.sensors import Sensor
 
 Array = Any
 Update = Callable[..., Posterior]
 OUTPUTS = ("mean", "cov", "nis", "dof", "loglik", "innovation", "variance", "status")
+SUMMARY = ("nis", "dof", "loglik", "status")  # what a stream keeps of every step
 
 
 def leaves(n: int, k: int) -> dict[str, Leaf]:
@@ -49,6 +50,7 @@ def leaves(n: int, k: int) -> dict[str, Leaf]:
         "innovation": Vector(k),
         "variance": Vector(k),
         "status": Scalar(),
+        "summary": Vector(len(SUMMARY)),
     }
 
 
@@ -76,7 +78,7 @@ class Recursion:
     update: Update
     settings: tuple[tuple[str, Any], ...]
     motion: Motion
-    sensor: Radar
+    sensor: Sensor
 
     @property
     def size(self) -> tuple[int, int]:
@@ -95,6 +97,7 @@ class Recursion:
         prior = predict(Gaussian(state["mean"], state["cov"]), motion, inputs["dt"])
         post = self.update(prior, inputs["z"], sensor.components(motion), **dict(self.settings))
         results = post._asdict() | {"status": status_of(post.mean, post.cov)}
+        results["summary"] = np.array([results[name] for name in SUMMARY])
         return {"mean": post.mean, "cov": post.cov}, results
 
     def kernel(self, rates: Mapping[str, Rate], outputs: Mapping[str, Rate]) -> Kernel:

@@ -7,7 +7,7 @@ A plot is an array (k,), SI units and radians, NaN where a component was not mea
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -35,6 +35,17 @@ class Pose:
     position_m: Array = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
     rotation: Array = field(default_factory=lambda: np.eye(3), metadata={"shape": (3, 3)})
     velocity_mps: Array = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
+
+
+class Sensor(Protocol):
+    """What a filter needs to know of a sensor."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What a plot of this sensor holds, in order, with units."""
+
+    def components(self, motion: Motion) -> tuple[Component, ...]:
+        """The formulas of what is measured, for states of `motion`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +141,38 @@ def _sigma(name: str, value: Any) -> Any:
             next_step=f"leave {name} out if the sensor does not measure it",
         )
     return sigma
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionSensor:
+    """A sensor that measures coordinates of the track frame: multilateration, GPS.
+
+    Attributes:
+        x_m, y_m, z_m: standard deviations, m; z_m is None for a planar sensor.
+    """
+
+    x_m: Any
+    y_m: Any
+    z_m: Any = None
+
+    def __post_init__(self) -> None:
+        """Numbers become floats or arrays, and are checked."""
+        for name in self.names:
+            object.__setattr__(self, name, _sigma(name, getattr(self, name)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coordinates that are measured."""
+        return ("x_m", "y_m") if self.z_m is None else ("x_m", "y_m", "z_m")
+
+    def components(self, motion: Motion) -> tuple[Component, ...]:
+        """Each coordinate of the state's position."""
+        if motion.dims < len(self.names):
+            raise UsageError(f"a sensor of {self.names} cannot see a motion in {motion.dims} dims")
+        return tuple(
+            Component(name, lambda state, i=i: state[i], getattr(self, name))
+            for i, name in enumerate(self.names)
+        )
 
 
 def Bearings(*, azimuth_deg: Any, pose: Pose | None = None) -> Radar:

@@ -1,0 +1,127 @@
+"""Every filter by name: the only list. `boresight cite NAME` prints where a filter comes from."""
+
+import re
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from importlib import resources
+from inspect import getdoc, getmodule, signature
+from typing import Any
+
+from boresight.errors import UsageError
+from boresight.filters import ekf, kalman, mekf
+from boresight.filters.recursion import Recursion, Update
+from boresight.models.motion import Motion
+from boresight.models.sensors import Sensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class Filter:
+    """A filter: its formula, its settings and where it comes from.
+
+    Attributes:
+        name: catalogue name.
+        update: formula (prior, z, components, **settings) -> Posterior.
+        summary: one line for lists.
+        paper: key in papers.bib.
+        settings: keyword arguments of the formula that differ from its defaults.
+    """
+
+    name: str
+    update: Update
+    summary: str
+    paper: str
+    settings: tuple[tuple[str, Any], ...] = ()
+
+    def with_settings(self, **settings: Any) -> "Filter":
+        """The same filter with settings changed; unknown ones raise UsageError."""
+        parameters = signature(self.update).parameters.values()
+        known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.name != "correct"]
+        for name in settings:
+            if name not in known:
+                raise UsageError(
+                    f"{self.name} has no setting {name!r}",
+                    next_step=f"use {', '.join(known)}" if known else "it has no settings",
+                )
+        hashable = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
+        return replace(self, settings=tuple(sorted((dict(self.settings) | hashable).items())))
+
+    def recursion(self, motion: Motion, sensor: Sensor) -> Recursion:
+        """Predict and update with this filter, ready to run over lanes."""
+        return Recursion(self.update, self.settings, motion, sensor)
+
+
+_FILTERS = {
+    f.name: f
+    for f in (
+        Filter(
+            name="kf",
+            update=kalman.update_plot,
+            summary="linear Kalman filter, for sensors that measure coordinates",
+            paper="kalman1960",
+        ),
+        Filter(
+            name="ekf",
+            update=ekf.update,
+            summary="extended Kalman filter, all components at once",
+            paper="jazwinski1970",
+        ),
+        Filter(
+            name="ekf-sequential",
+            update=ekf.update_sequential,
+            summary="extended Kalman filter, one component after the other",
+            paper="jazwinski1970",
+        ),
+        Filter(
+            name="iekf",
+            update=ekf.update_iterated,
+            summary="iterated extended Kalman filter (Gauss-Newton)",
+            paper="bell1993",
+        ),
+        Filter(
+            name="mekf",
+            update=mekf.update,
+            summary="modified extended Kalman filter: elevation, azimuth, then corrected range",
+            paper="kashyap",
+        ),
+        Filter(
+            name="mekf-block",
+            update=mekf.update_block,
+            summary="modified extended Kalman filter, all components at once",
+            paper="aditya",
+        ),
+    )
+}
+
+
+def names() -> tuple[str, ...]:
+    """Names of all filters."""
+    return tuple(_FILTERS)
+
+
+def lookup(name: str) -> Filter:
+    """The filter of that name; UsageError with the nearest valid name if there is none."""
+    if name in _FILTERS:
+        return _FILTERS[name]
+    near = get_close_matches(name, _FILTERS, n=1)
+    raise UsageError(
+        f"there is no filter {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
+        next_step=f"use one of {', '.join(_FILTERS)}",
+    )
+
+
+def cite(name: str) -> dict[str, str]:
+    """Where a filter comes from: `key`, `bibtex`, and how ours `differs` from it."""
+    entry = lookup(name)
+    text = (resources.files("boresight") / "papers.bib").read_text(encoding="utf-8")
+    found = re.search(rf"^@\w+\{{{re.escape(entry.paper)},.*?^\}}", text, re.MULTILINE | re.DOTALL)
+    if found is None:
+        raise UsageError(f"papers.bib has no entry {entry.paper!r}, which {name!r} names")
+    doc = getdoc(getmodule(entry.update)) or ""
+    differs = re.search(
+        r"^Differs from (?:it|them)[:,]\s*(.*?)(?:\n\n|\Z)", doc, re.MULTILINE | re.DOTALL
+    )
+    return {
+        "key": entry.paper,
+        "bibtex": found.group(0),
+        "differs": " ".join(differs.group(1).split()) if differs else "",
+    }

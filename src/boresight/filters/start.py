@@ -1,0 +1,136 @@
+"""How a track begins: given, drawn at random, or made from its first one or two plots.
+
+All functions take many targets at once (lanes first). A start has the same state order as the
+motion: positions, velocities, and whatever follows, which begins at zero with a stated spread.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import UsageError
+from boresight.maths import Gaussian
+from boresight.models.motion import Motion
+from boresight.models.sensors import PositionSensor, Radar, Sensor
+
+Array = Any
+SPEED_MPS = 300.0  # spread of an unknown velocity, each axis: covers airliners
+ACCELERATION_MPS2 = 10.0  # spread of further states: 1 g
+
+
+def random_draw(prior: Gaussian, generator: np.random.Generator, lanes: int) -> Gaussian:
+    """Means drawn from the prior, one a lane, each with the prior's covariance.
+
+    Args:
+        prior: mean (n,) or (lanes, n), cov (n, n); the cov may be singular.
+        generator: source of normals.
+        lanes: number of lanes.
+    """
+    values, vectors = np.linalg.eigh(np.asarray(prior.cov, dtype=float))
+    root = vectors * np.sqrt(np.clip(values, 0.0, None))
+    normals = generator.standard_normal((lanes, len(values)))
+    return Gaussian(np.asarray(prior.mean) + normals @ root.T, prior.cov)
+
+
+def one_plot(z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float = SPEED_MPS) -> Gaussian:
+    """Position from one plot, velocity unknown. Paper: kashyap (3), with R = J R J'.
+
+    Args:
+        z: (lanes, k) plots, SI units and radians.
+        motion: state layout.
+        sensor: a radar with range, azimuth and, in three dimensions, elevation; or coordinates.
+        speed_mps: standard deviation of each velocity.
+
+    Returns:
+        mean (lanes, n), cov (lanes, n, n); NaN where the plot lacks a component that is needed.
+    """
+    position, spread = locate(z, motion, sensor)
+    n, dims = len(motion.names), motion.dims
+    mean = np.zeros((len(position), n))
+    cov = np.zeros((len(position), n, n))
+    mean[:, :dims], cov[:, :dims, :dims] = position, spread
+    for i in range(dims, n):
+        cov[:, i, i] = (speed_mps if i < 2 * dims else ACCELERATION_MPS2) ** 2
+    return Gaussian(mean, cov)
+
+
+def two_plots(first: Array, second: Array, dt: Array, motion: Motion, sensor: Sensor) -> Gaussian:
+    """Position from the second plot, velocity from the difference (two-point differencing).
+
+    Args:
+        first: (lanes, k) earlier plots.
+        second: (lanes, k) later plots.
+        dt: seconds between them, a number or (lanes,).
+        motion: state layout, as in `one_plot`.
+        sensor: as in `one_plot`.
+    """
+    start = one_plot(second, motion, sensor)
+    before, spread = locate(first, motion, sensor)
+    after, later = locate(second, motion, sensor)
+    d, t = motion.dims, np.broadcast_to(np.asarray(dt, dtype=float), len(before))[:, None]
+    mean, cov = start
+    mean[:, d : 2 * d] = (after - before) / t
+    cov[:, d : 2 * d, d : 2 * d] = (spread + later) / t[..., None] ** 2
+    cov[:, :d, d : 2 * d] = cov[:, d : 2 * d, :d] = later / t[..., None]
+    moved = motion.noise(float(np.mean(t)))  # what the motion may have done in between
+    cov[:, d : 2 * d, d : 2 * d] += moved[d : 2 * d, d : 2 * d]
+    return Gaussian(mean, cov)
+
+
+def locate(z: Array, motion: Motion, sensor: Sensor) -> tuple[Array, Array]:
+    """Position (lanes, dims) of each plot in the track frame, and its covariance."""
+    z = np.atleast_2d(np.asarray(z, dtype=float))
+    if isinstance(sensor, PositionSensor):
+        sigmas = np.array([getattr(sensor, name) for name in sensor.names], dtype=float)
+        return z[:, : motion.dims], np.broadcast_to(
+            np.diag(sigmas**2), (len(z), *2 * [len(sigmas)])
+        )
+    if not isinstance(sensor, Radar):
+        raise UsageError(f"no start from one plot of a {type(sensor).__name__}", next_step=_GIVE)
+    needed = ("range_m", "azimuth_rad", "elevation_rad")[: motion.dims]
+    lacking = [name for name in needed if name not in sensor.names]
+    if lacking:
+        raise UsageError(
+            f"a plot without {lacking[0]} does not say where the target is", next_step=_GIVE
+        )
+    columns = [sensor.names.index(name) for name in needed]
+    spreads = [_first(getattr(sensor, name.replace("_rad", "_deg"))) for name in needed]
+    spreads[1:] = [np.radians(s) for s in spreads[1:]]
+    position, J = from_polar(z[:, columns])
+    variances = np.stack([np.broadcast_to(s, len(z)) for s in spreads], axis=-1) ** 2
+    cov = np.einsum("bij,bj,bkj->bik", J, variances, J)
+    if sensor.pose is not None:
+        turn = np.asarray(sensor.pose.rotation, dtype=float).reshape(-1, 3, 3)[0]
+        turn = turn[: motion.dims, : motion.dims]
+        origin = np.asarray(sensor.pose.position_m, dtype=float).reshape(-1, 3)[0, : motion.dims]
+        position, cov = position @ turn + origin, turn.T @ cov @ turn
+    return position, cov
+
+
+_GIVE = "give the start: start=Gaussian(mean, cov)"
+
+
+def _first(sigma: Any) -> Any:
+    """A noise at the first step: a number, or one a lane."""
+    array = np.asarray(sigma, dtype=float)
+    return array[:, 0] if array.ndim == 2 else array
+
+
+def from_polar(polar: Array) -> tuple[Array, Array]:
+    """Cartesian position of (range, azimuth[, elevation]) and its Jacobian.
+
+    Args:
+        polar: (lanes, 2 or 3), m and rad, azimuth from x towards y.
+
+    Returns:
+        (lanes, dims) and (lanes, dims, dims). Paper: kashyap (3).
+    """
+    r, az = polar[:, 0], polar[:, 1]
+    el = polar[:, 2] if polar.shape[1] == 3 else np.zeros_like(az)
+    ca, sa, ce, se = np.cos(az), np.sin(az), np.cos(el), np.sin(el)
+    unit = np.stack([ca * ce, sa * ce, se], axis=-1)
+    across = np.stack([-sa * ce, ca * ce, 0 * az], axis=-1)
+    upward = np.stack([-ca * se, -sa * se, ce], axis=-1)
+    J = np.stack([unit, r[:, None] * across, r[:, None] * upward], axis=-1)
+    d = polar.shape[1]
+    return (r[:, None] * unit)[:, :d], J[:, :d, :d]

@@ -1,0 +1,192 @@
+"""One step at a time, live: state in, state out, in microseconds.
+
+    step = stream(recursion)
+    state = step.start(plot)
+    state = step(state, plot, dt=4.0)
+
+Nothing changes after birth: a state can be kept, branched and replayed, and the same plots give the
+same bits live as in a batch of thousands.
+"""
+
+import ctypes
+from ctypes import addressof, c_double
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import Status, UsageError
+from boresight.filters.recursion import SUMMARY, Recursion, start_states
+from boresight.filters.start import SPEED_MPS, one_plot
+from boresight.lanes import BLOCK, Kernel, Rate, States
+from boresight.maths import Gaussian
+from boresight.models.parameters import rate_of
+
+Array = Any
+
+
+class StreamState:
+    """The state of one target or many after a step.
+
+    `mean` (n,) and `cov` (n, n), with a leading axis where the stream holds several targets;
+    `nis`, `dof` and `loglik` of the last plot; `status`, a `Status`.
+    """
+
+    __slots__ = ("_stream", "buffer")
+
+    def __init__(self, stream: "Stream", buffer: Any) -> None:
+        self._stream = stream
+        self.buffer = buffer  # the kernel's own memory: blocked state, then the summary
+
+    @property
+    def mean(self) -> Array:
+        """State mean."""
+        return self._stream.leaf(self.buffer, "mean")
+
+    @property
+    def cov(self) -> Array:
+        """State covariance."""
+        return self._stream.leaf(self.buffer, "cov")
+
+    @property
+    def nis(self) -> Any:
+        """Normalised innovation squared of the last plot; 0 after a start."""
+        return self._stream.output(self.buffer, "nis")
+
+    @property
+    def dof(self) -> Any:
+        """How many components the last plot measured."""
+        return self._stream.output(self.buffer, "dof")
+
+    @property
+    def loglik(self) -> Any:
+        """Log-likelihood of the last plot."""
+        return self._stream.output(self.buffer, "loglik")
+
+    @property
+    def status(self) -> Any:
+        """`Status` of the state; for several targets an array of codes."""
+        code = self._stream.output(self.buffer, "status")
+        return Status(int(code)) if np.ndim(code) == 0 else code.astype(int)
+
+
+class Stream:
+    """A filter for one target (targets=None) or a fixed number of them, fed plot by plot."""
+
+    def __init__(self, recursion: Recursion, targets: int | None = None) -> None:
+        self.recursion, self.targets = recursion, targets
+        self._lanes = 1 if targets is None else targets
+        self._components = len(recursion.sensor.names)
+        rated = {
+            name: rate_of(name, value, leaf) for name, (value, leaf) in recursion.models().items()
+        }
+        for name, (rate, _) in rated.items():
+            if rate & Rate.STEP:
+                raise UsageError(f"{name} changes from step to step; a stream needs one value")
+        rates = {name: rate for name, (rate, _) in rated.items()}
+        rates |= {"z": Rate.EACH, "dt": Rate.FIXED}
+        self._kernel: Kernel = recursion.kernel(rates, {"summary": Rate.LANE})
+        self._values = {name: value for name, (_, value) in rated.items()}
+        self._bind()
+
+    def _bind(self) -> None:
+        """Fix addresses and sizes once: looking them up costs more than the filter does."""
+        program, code = self._kernel.program, self._kernel.code
+        self._state_numbers = -(-self._lanes // BLOCK) * program.state_size * BLOCK
+        self._summary = 8 * self._state_numbers  # byte offset
+        self._buffer_type: Any = ctypes.c_double * (
+            self._state_numbers + len(SUMMARY) * self._lanes
+        )
+        self._plot_type: Any = ctypes.c_double * (self._components * self._lanes)
+        names = [slot.name for slot in program.inputs]
+        if names[:2] != ["z", "dt"]:
+            raise AssertionError("the recursion declares the plot and dt first")
+        self._keep = [np.ascontiguousarray(self._values[n], dtype=float) for n in names[2:]]
+        self._numbers = tuple(array.ctypes.data for array in self._keep)
+        self._call = code.call if code else None
+        self._chunks = code.chunks(self._lanes) if code else 0
+
+    def start(self, plot: Array | Gaussian, *, speed_mps: float = SPEED_MPS) -> StreamState:
+        """Begin from a plot (k,) or (targets, k), or from a Gaussian."""
+        prior = plot
+        if not isinstance(plot, Gaussian):
+            prior = one_plot(
+                plot, self.recursion.motion, self.recursion.sensor, speed_mps=speed_mps
+            )
+        states = start_states(prior, self._lanes)
+        buffer = self._buffer_type()
+        np.frombuffer(buffer)[: self._state_numbers] = states.data.ravel()
+        return StreamState(self, buffer)
+
+    def __call__(self, state: StreamState, plot: Array, dt: float) -> StreamState:
+        """The state after dt seconds and a plot.
+
+        Args:
+            state: where the targets were; not changed.
+            plot: (k,) or (targets, k), SI units and radians, NaN where missing.
+            dt: seconds since that state, not negative.
+        """
+        if not dt >= 0.0:
+            raise UsageError(
+                f"dt={dt!r} s: time does not go backwards",
+                next_step="keep the states of earlier plots and step again from the one before",
+            )
+        if self.targets is None:
+            if len(plot) != self._components:
+                raise self._wrong(plot)
+            z: Any = self._plot_type(*plot)
+            address = addressof(z)
+        else:
+            z = np.ascontiguousarray(plot, dtype=float)
+            if z.shape != (self._lanes, self._components):
+                raise self._wrong(plot)
+            address = z.ctypes.data
+        if self._call is None:
+            return self._in_numpy(state, z, dt)
+        buffer, clock = self._buffer_type(), c_double(dt)
+        new = addressof(buffer)
+        self._call(
+            0,
+            self._chunks,
+            1,
+            self._lanes,
+            addressof(state.buffer),
+            new,
+            address,
+            addressof(clock),
+            *self._numbers,
+            new + self._summary,
+        )
+        return StreamState(self, buffer)
+
+    def _wrong(self, plot: Any) -> UsageError:
+        shape = (self._components,) if self.targets is None else (self._lanes, self._components)
+        return UsageError(
+            f"a plot has shape {np.shape(plot)}; {shape} is needed",
+            why=f"the sensor measures {', '.join(self.recursion.sensor.names)}",
+        )
+
+    def _in_numpy(self, state: StreamState, z: Any, dt: float) -> StreamState:
+        rows = np.array(z, dtype=float).reshape(self._lanes, 1, self._components)
+        values = self._values | {"z": rows, "dt": dt}
+        final, outputs = self._kernel.run(self._states(state.buffer), values, 1)
+        buffer = self._buffer_type()
+        numbers = np.frombuffer(buffer)
+        numbers[: self._state_numbers] = final.data.ravel()
+        numbers[self._state_numbers :] = outputs["summary"].ravel()
+        return StreamState(self, buffer)
+
+    def _states(self, buffer: Any) -> States:
+        program = self._kernel.program
+        data = np.frombuffer(buffer)[: self._state_numbers]
+        return States(program.state, data.reshape(-1, program.state_size, 8), self._lanes)
+
+    def leaf(self, buffer: Any, name: str) -> Array:
+        """A leaf of the state as a plain array."""
+        value = self._states(buffer)[name]
+        return value[0] if self.targets is None else value
+
+    def output(self, buffer: Any, name: str) -> Any:
+        """An output of the last step: a number, or (targets,)."""
+        rows = np.frombuffer(buffer)[self._state_numbers :].reshape(self._lanes, len(SUMMARY))
+        column = rows[:, SUMMARY.index(name)]
+        return float(column[0]) if self.targets is None else column.copy()

@@ -1,0 +1,96 @@
+"""The verbs a user types in Python: friendly over what is exact below."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from boresight import catalogue
+from boresight.errors import UsageError
+from boresight.filters.recursion import Estimate, run_recursion
+from boresight.filters.start import one_plot
+from boresight.filters.stream import Stream
+from boresight.maths import Gaussian
+from boresight.models.motion import Motion
+from boresight.models.sensors import Sensor
+
+Array = Any
+
+
+def run(
+    name: str,
+    motion: Motion,
+    sensor: Sensor,
+    plots: Any,
+    *,
+    dt: Array | None = None,
+    start: Gaussian | None = None,
+    outputs: Sequence[str] = ("mean", "cov", "nis"),
+    last: bool = False,
+    threads: int = 1,
+    **settings: Any,
+) -> Estimate:
+    """Filter many runs at once.
+
+    Args:
+        name: a filter of the catalogue, such as "ekf" or "mekf".
+        motion: how the targets move.
+        sensor: what measured the plots.
+        plots: what `simulate` gives, or an array (runs, scans, k) in SI units and radians with
+            NaN where nothing was measured.
+        dt: seconds before each scan: a number, (1, scans), (runs, 1) or (runs, scans); the first
+            scan's dt is the time since `start`. Left out: what `plots` carries.
+        start: Gaussian with mean (n,) or (runs, n). Left out: what `plots` carries, else the
+            first plot (which is then used for the start only).
+        outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status.
+        last: give outputs after the last scan only.
+        threads: threads that share the runs; the result does not depend on it.
+        settings: the filter's own, such as `mu="none"` for the MEKF.
+
+    Returns:
+        The outputs as attributes: mean (runs, scans, n), cov (runs, scans, n, n), ...
+
+    Raises:
+        UsageError: an unknown name or setting, or shapes that do not fit.
+    """
+    z = np.asarray(getattr(plots, "z", plots), dtype=float)
+    steps = getattr(plots, "dt", None) if dt is None else dt
+    if steps is None:
+        raise UsageError("the plots carry no dt", next_step="pass dt= in seconds")
+    recursion = catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor)
+    prior = getattr(plots, "prior", None) if start is None else start
+    if prior is None:
+        prior, z, steps = _start_from_first(z, steps, motion, sensor)
+    return run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
+
+
+def _start_from_first(
+    z: Array, dt: Array, motion: Motion, sensor: Sensor
+) -> tuple[Gaussian, Array, Array]:
+    """A start from the first plot, which is then not used again."""
+    prior = one_plot(z[:, 0], motion, sensor)
+    rest = z.copy()
+    rest[:, 0] = np.nan
+    steps = np.array(np.broadcast_to(dt, (np.shape(dt)[0] if np.ndim(dt) else 1, z.shape[1])))
+    steps[:, 0] = 0.0
+    return prior, rest, steps
+
+
+def stream(
+    name: str, motion: Motion, sensor: Sensor, *, targets: int | None = None, **settings: Any
+) -> Stream:
+    """A filter fed plot by plot, live; state in, state out.
+
+    Args:
+        name: a filter of the catalogue.
+        motion: how the target moves.
+        sensor: what measures it.
+        targets: None for one target; a number for that many at once.
+        settings: the filter's own.
+
+    Returns:
+        `step`: `state = step.start(plot)`, then `state = step(state, plot, dt=4.0)`.
+    """
+    return Stream(
+        catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor), targets
+    )
