@@ -13,6 +13,8 @@ from boresight.experiments.truth import Motion, Truth
 from boresight.formats.asterix import decode
 from boresight.formats.specs import edition
 from boresight.maths import frames
+from boresight.maths.angles import wrap
+from boresight.tracking.result import TrackingResult
 
 MB = 1e6
 FOLDER = files("boresight") / "demo"
@@ -262,3 +264,74 @@ def test_planted_biases_come_back_against_the_adsb_reports(records):
     assert count > 6_000
     np.testing.assert_array_less(np.abs(estimate - planted), 3 * spread)
     np.testing.assert_array_less(spread, [2.5, 0.0015, 0.004])
+
+
+def everyone(truth, step_s=5.0):
+    """Flights and times at which the truth of all is known, with room for a clock's error."""
+    ends = truth.knots.group_by("flight").agg(
+        first=pl.col("time_s").min(), last=pl.col("time_s").max()
+    )
+    parts = [(f, np.arange(a + 1, b, step_s)) for f, a, b in ends.sort("flight").iter_rows()]
+    flight = np.concatenate([np.full(len(time), f) for f, time in parts])
+    return flight, np.concatenate([time for _, time in parts])
+
+
+def test_the_truth_as_seen_is_what_a_noiseless_radar_reports(truth):
+    flight, time = everyone(truth)
+    seen = demo.as_seen(truth.at(flight, time), FACTS)
+    then = truth.at(flight, time - RADAR["time_bias_s"])
+    polar, found = frames.polar_from_enu(then.position), frames.polar_from_enu(seen.position)
+    delay = excess(polar.range_m, frames.ellipsoid_height(*then.position.T, SITE))
+    expected = polar.range_m + delay + RADAR["range_bias_m"]
+    near = polar.range_m < 150e3  # beyond, the ray's own bow begins to shorten the delay
+    np.testing.assert_allclose(found.range_m[near], expected[near], atol=0.1)
+    across = wrap(found.azimuth - polar.azimuth - np.radians(RADAR["azimuth_bias_deg"]))
+    np.testing.assert_allclose(across * polar.range_m, 0, atol=0.1)
+    later = demo.as_seen(truth.at(flight, time + 0.5), FACTS)
+    earlier = demo.as_seen(truth.at(flight, time - 0.5), FACTS)
+    slope = later.position - earlier.position
+    np.testing.assert_allclose(seen.velocity, slope, atol=0.5)  # jerk/24 for a second
+
+
+def tracks_with_errors(truth, scale):
+    """A result whose errors are drawn from the covariance it states, times `scale` squared."""
+    rng = np.random.Generator(np.random.Philox(key=5))
+    flight, time = everyone(truth)
+    motion = truth.at(flight, time)
+    root = np.tril(rng.normal(size=(6, 6))) * 0.3 + np.diag([40, 50, 60, 2, 3, 4])
+    errors = rng.normal(size=(len(time), 6)) @ root.T * scale
+    state = np.hstack([motion.position, motion.velocity]) + errors
+    names = ["east_m", "north_m", "up_m", "east_mps", "north_mps", "up_mps"]
+    cov = root @ root.T
+    upper = {f"cov_{i}_{j}": cov[i, j] for i in range(6) for j in range(i, 6)}
+    who = pl.DataFrame(FACTS["flights"]).select("address", "mode_a")[flight]
+    table = pl.DataFrame(state, schema=names).with_columns(
+        who["address"].replace("", None), who["mode_a"], track=flight, time_s=time,
+        status=pl.lit("updated"), **{name: pl.lit(value) for name, value in upper.items()},
+    )  # fmt: skip
+    nothing = pl.DataFrame()
+    nis = {"all": {"mean": 1.0, "median": 0.7, "dof": 2.0, "scans": len(time)}}
+    result = TrackingResult(
+        tracks=table, residuals=nothing, targets=nothing, skipped=nothing, plots=len(time),
+        used=len(time), rejected=0, filter="drawn", nis=nis, settings={},
+    )  # fmt: skip
+    return result, cov
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_errors_drawn_from_the_stated_covariance_are_called_consistent(truth, scale):
+    result, cov = tracks_with_errors(truth, scale)
+    rows = demo.settled_rows(result, FACTS)
+    assert rows["flight"].n_unique() == len(FACTS["flights"])
+    assert rows["flight"].to_list() == rows["track"].to_list()
+    motion = truth.at(rows["flight"].to_numpy(), rows["time_s"].to_numpy())
+    found = demo.compare(result, motion, rows, ns=100.0)
+    share = 4 / np.sqrt(2 * len(rows))  # four standard errors
+    assert found.position_rmse_m == pytest.approx(scale * np.sqrt(cov[0, 0] + cov[1, 1]), rel=share)
+    expected = scale * np.sqrt(cov[3, 3] + cov[4, 4])
+    assert found.velocity_rmse_mps == pytest.approx(expected, rel=share)
+    assert found.anees == pytest.approx(scale**2, rel=share)
+    low, high = found.anees_bounds
+    assert (low < found.anees < high) == (scale == 1.0)
+    # chi-square over 204 degrees of freedom, tables: 166.3 and 245.5 (Wilson and Hilferty)
+    assert (low, high) == pytest.approx((0.815, 1.203), abs=0.003)
