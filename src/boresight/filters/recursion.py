@@ -8,7 +8,7 @@ and one kernel serves all their values.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -29,13 +29,14 @@ from boresight.lanes import (
     trace,
 )
 from boresight.maths import Gaussian, select
+from boresight.models.components import Component
 from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, structure, with_numbers
 from boresight.models.sensors import Sensor
 
 Array = Any
 Update = Callable[..., Posterior]
-OUTPUTS = ("mean", "cov", "nis", "dof", "loglik", "innovation", "variance", "status")
+OUTPUTS = ("mean", "cov", "nis", "dof", "loglik", "innovation", "variance", "status", "inside")
 SUMMARY = ("nis", "dof", "loglik", "status")  # what a stream keeps of every step
 
 
@@ -50,8 +51,18 @@ def leaves(n: int, k: int) -> dict[str, Leaf]:
         "innovation": Vector(k),
         "variance": Vector(k),
         "status": Scalar(),
+        "inside": Scalar(),
         "summary": Vector(len(SUMMARY)),
     }
+
+
+class Guard(Protocol):
+    """Decides whether a plot can be the target's; a frozen dataclass of numbers."""
+
+    def admit(
+        self, prior: Gaussian, z: Array, components: Sequence[Component]
+    ) -> tuple[Array, Any]:
+        """The plot, NaN if it is turned away, and 1 if it was admitted, else 0."""
 
 
 def status_of(mean: Array, cov: Array) -> Any:
@@ -73,12 +84,14 @@ class Recursion:
         update: the filter's formula.
         settings: its keyword arguments.
         motion, sensor: the models; their numbers are not part of the recursion's identity.
+        guard: turns away plots that cannot be the target's, before the update sees them.
     """
 
     update: Update
     settings: tuple[tuple[str, Any], ...]
     motion: Motion
     sensor: Sensor
+    guard: "Guard | None" = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -87,7 +100,8 @@ class Recursion:
 
     def models(self) -> dict[str, tuple[Any, Leaf]]:
         """Numbers of both models."""
-        return numbers(self.motion, "motion") | numbers(self.sensor, "sensor")
+        found = numbers(self.motion, "motion") | numbers(self.sensor, "sensor")
+        return found | numbers(self.guard, "guard") if self.guard else found
 
     def step(self, state: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[Any, Any]:
         """One prediction and update of one target; the formula that is recorded."""
@@ -95,14 +109,21 @@ class Recursion:
         motion = with_numbers(self.motion, "motion", values)
         sensor = with_numbers(self.sensor, "sensor", values)
         prior = predict(Gaussian(state["mean"], state["cov"]), motion, inputs["dt"])
-        post = self.update(prior, inputs["z"], sensor.components(motion), **dict(self.settings))
-        results = post._asdict() | {"status": status_of(post.mean, post.cov)}
+        components, z, inside = sensor.components(motion), inputs["z"], 1.0
+        if self.guard:
+            z, inside = with_numbers(self.guard, "guard", values).admit(prior, z, components)
+        post = self.update(prior, z, components, **dict(self.settings))
+        results = post._asdict() | {
+            "status": status_of(post.mean, post.cov),
+            "inside": inside,
+        }
         results["summary"] = np.array([results[name] for name in SUMMARY])
         return {"mean": post.mean, "cov": post.cov}, results
 
     def kernel(self, rates: Mapping[str, Rate], outputs: Mapping[str, Rate]) -> Kernel:
         """The compiled step, kept for the next call with the same structure and rates."""
-        identity = (self.update, self.settings, structure(self.motion), structure(self.sensor))
+        models = [m for m in (self.motion, self.sensor, self.guard) if m is not None]
+        identity = (self.update, self.settings, *map(structure, models))
         wanted, given = tuple(sorted(outputs.items())), tuple(sorted(rates.items()))
         return _kernel(_Key(self, identity), given, wanted)
 

@@ -60,7 +60,8 @@ class Component:
     """One measured number of a plot.
 
     Attributes:
-        name: `range_m`, `azimuth_rad`, `elevation_rad`, `height_m`, `range_rate_mps`.
+        name: `range_m`, `azimuth_rad`, `elevation_rad`, `height_m`, `pressure_altitude_m`,
+            `range_rate_mps`, or a coordinate.
         value: formula of the state (n,).
         sigma: standard deviation, in the unit of the name.
     """

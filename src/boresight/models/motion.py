@@ -14,6 +14,7 @@ from boresight.errors import UsageError
 from boresight.maths import select
 
 Array = Any
+OFFSET = "height_offset_m"  # pressure altitude minus height above the ellipsoid
 
 
 class Motion(Protocol):
@@ -225,6 +226,40 @@ class Static:
         """Covariance (dims, dims)."""
         q = self.drift_m_per_sqrt_s * self.drift_m_per_sqrt_s
         return _outer([[q * dt]], self.dims)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WithHeightOffset:
+    """Any motion in three dimensions, with the offset of pressure altitude as its last state.
+
+    Attributes:
+        inner: how the target moves.
+        drift_m_per_sqrt_s: random walk of the offset, m after one second.
+    """
+
+    inner: ConstantVelocity | ConstantAcceleration
+    drift_m_per_sqrt_s: float
+
+    @property
+    def dims(self) -> int:
+        """Those of the inner motion."""
+        return self.inner.dims
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """States of the inner motion, then `height_offset_m`."""
+        return (*self.inner.names, OFFSET)
+
+    def move(self, state: Array, dt: Any) -> Array:
+        """The offset stays."""
+        return np.concatenate([self.inner.move(state[:-1], dt), state[-1:]])
+
+    def noise(self, dt: Any) -> Array:
+        """Block diagonal: the inner motion's noise, and the walk."""
+        inner = self.inner.noise(dt)
+        walk = self.drift_m_per_sqrt_s * self.drift_m_per_sqrt_s * dt
+        column = np.array([[walk * 0.0]] * len(inner))
+        return np.block([[inner, column], [column.T, np.array([[walk]])]])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """Sensors: what they measure, how well, and from where. Arguments name their units.
 
 A sensor is frozen data. `components(motion)` gives the formulas of what it measures, in the order
-in which a plot `z` holds them: range, azimuth, elevation, height, range rate, those that it has.
+in which a plot `z` holds them: range, azimuth, elevation, heights, range rate, those that it has.
 A plot is an array (k,), SI units and radians, NaN where a component was not measured.
 """
 
@@ -14,10 +14,18 @@ import numpy as np
 from boresight.errors import UsageError
 from boresight.maths.frames import Site, ellipsoid_height
 from boresight.models.components import FORMULAS, Component
-from boresight.models.motion import Motion
+from boresight.models.motion import OFFSET, Motion
 
 Array = Any
 _RADIANS = np.pi / 180.0
+_SIGMAS = (
+    "range_m",
+    "azimuth_deg",
+    "elevation_deg",
+    "height_m",
+    "pressure_altitude_m",
+    "range_rate_mps",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +65,8 @@ class Radar:
         azimuth_deg: azimuth, degrees.
         elevation_deg: elevation, degrees; None where it is not measured.
         height_m: reported height above the ellipsoid, m; needs `site`.
+        pressure_altitude_m: what a transponder reports, m; needs `site`. It differs from the
+            height by an offset that weather makes; a motion `WithHeightOffset` carries that.
         range_rate_mps: range rate, m/s, positive when opening.
         pose: None for a fixed radar at the origin of the track frame, along its axes.
         site: place of the track frame's origin; needed only for `height_m`. The frame is then
@@ -67,19 +77,20 @@ class Radar:
     azimuth_deg: Any = None
     elevation_deg: Any = None
     height_m: Any = None
+    pressure_altitude_m: Any = None
     range_rate_mps: Any = None
     pose: Pose | None = None
     site: Site | None = None
 
     def __post_init__(self) -> None:
         """Numbers become floats or arrays, and are checked."""
-        for name in ("range_m", "azimuth_deg", "elevation_deg", "height_m", "range_rate_mps"):
+        for name in _SIGMAS:
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _sigma(name, value))
-        if self.height_m is not None and self.site is None:
+        if self.site is None and not (self.height_m is None and self.pressure_altitude_m is None):
             raise UsageError(
-                "a radar with height_m needs a site",
+                "a radar that is told heights needs a site",
                 why="height above the ellipsoid depends on where the frame's origin is",
                 next_step="pass site=Site(latitude_deg=..., longitude_deg=..., height_m=...)",
             )
@@ -92,6 +103,7 @@ class Radar:
             "azimuth_rad": self.azimuth_deg,
             "elevation_rad": self.elevation_deg,
             "height_m": self.height_m,
+            "pressure_altitude_m": self.pressure_altitude_m,
             "range_rate_mps": self.range_rate_mps,
         }
         return tuple(name for name, sigma in given.items() if sigma is not None)
@@ -101,8 +113,8 @@ class Radar:
         return tuple(self._component(name, motion) for name in self.names)
 
     def _component(self, name: str, motion: Motion) -> Component:
-        if name == "height_m":
-            return Component(name, self._height(motion.dims), self.height_m)
+        if name in ("height_m", "pressure_altitude_m"):
+            return Component(name, self._height(name, motion), getattr(self, name))
         formula, sigma = FORMULAS[name], getattr(self, name.replace("_rad", "_deg"))
         if name.endswith("_rad"):
             sigma = sigma * _RADIANS
@@ -124,10 +136,13 @@ class Radar:
             turn @ (v - self.pose.velocity_mps[:dims]),
         )
 
-    def _height(self, dims: int) -> Callable[[Array], Any]:
+    def _height(self, name: str, motion: Motion) -> Callable[[Array], Any]:
+        has_offset = name == "pressure_altitude_m" and OFFSET in motion.names
+
         def value(state: Array) -> Any:
-            north, east, up = state[:dims]
-            return ellipsoid_height(east, north, up, self.site)  # type: ignore[arg-type]
+            north, east, up = state[: motion.dims]
+            height = ellipsoid_height(east, north, up, self.site)  # type: ignore[arg-type]
+            return height + state[motion.names.index(OFFSET)] if has_offset else height
 
         return value
 
