@@ -79,12 +79,15 @@ def shipped() -> tuple[dict[str, Any], Truth]:
     return facts, Truth(pl.read_parquet(io.BytesIO((folder / "truth.parquet").read_bytes())))
 
 
-def as_seen(motion: Motion, facts: dict[str, Any]) -> Motion:
-    """Return truth (n, 3) as the radar would report it without noise: late, turned and too far."""
-    place = motion.position - motion.velocity * facts["radar"]["time_bias_s"]
-    step = 0.1 * motion.velocity
-    rate = (_seen_place(place + step, facts) - _seen_place(place - step, facts)) / 0.2
-    return Motion(_seen_place(place, facts), rate)
+def as_seen(truth: Truth, flight: Array, time_s: Array, facts: dict[str, Any]) -> Motion:
+    """Return flights (n,) as the radar would report them at times (n,) if it had no noise.
+
+    Its clock is fast, its azimuth turned, its range too long.
+    """
+    then = truth.at(flight, time_s - facts["radar"]["time_bias_s"])
+    step = 0.1 * then.velocity
+    ahead, behind = (_seen_place(then.position + sign * step, facts) for sign in (1, -1))
+    return Motion(_seen_place(then.position, facts), (ahead - behind) / 0.2)
 
 
 def _seen_place(place: Array, facts: dict[str, Any]) -> Array:
@@ -130,9 +133,9 @@ def plot_error(result: TrackingResult, truth: Truth, facts: dict[str, Any]) -> P
     identity = result.targets.select("track", "address", "mode_a")
     used = result.residuals.filter("used").select("track", "time_s", "range_m", "azimuth_deg")
     rows = _with_flight(used.join(identity, on="track"), facts).filter(pl.col("range_m") > 0)
-    motion = truth.at(rows["flight"].to_numpy(), rows["time_s"].to_numpy())
-    errors = (_plot_errors(rows, motion), _plot_errors(rows, as_seen(motion, facts)))
-    return PlotError(_rms(errors[0]), _rms(errors[1]), len(rows))
+    when = rows["flight"].to_numpy(), rows["time_s"].to_numpy()
+    true, seen = truth.at(*when), as_seen(truth, *when, facts)
+    return PlotError(_rms(_plot_errors(rows, true)), _rms(_plot_errors(rows, seen)), len(rows))
 
 
 def settled_rows(result: TrackingResult, facts: dict[str, Any]) -> "pl.DataFrame":
