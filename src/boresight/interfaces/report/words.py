@@ -1,0 +1,110 @@
+"""Figures as a reader likes them, and the few HTML elements that the page is made of."""
+
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Any, NamedTuple
+
+UNITS = {
+    "_mps2": "m/s²",
+    "_mps": "m/s",
+    "_deg": "°",
+    "_km": "km",
+    "_ns": "ns",
+    "_m": "m",
+    "_s": "s",
+}
+
+
+class Cell(NamedTuple):
+    """One cell of a table: HTML, the key it sorts by, and whether it is a figure."""
+
+    html: str
+    key: str = ""
+    is_figure: bool = False
+
+
+def figure(value: float | None, digits: int = 4) -> str:
+    """Render a number to `digits` significant digits, with thousands parted; a dash for none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if isinstance(value, int) or value == 0:
+        return f"{value:,.0f}"
+    places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    return f"{value:,.{places}f}"
+
+
+def percent(part: float, whole: float) -> str:
+    """Render a share: `99.5 %`."""
+    return f"{100 * part / whole:.1f} %" if whole else "–"
+
+
+def clock(time_s: float | None) -> str:
+    """Render seconds since midnight as `08:15:30`; later days are counted."""
+    if time_s is None or not math.isfinite(time_s):
+        return "–"
+    day, second = divmod(math.floor(time_s), 86_400)
+    text = f"{second // 3600:02d}:{second // 60 % 60:02d}:{second % 60:02d}"
+    return f"{text} +{day} d" if day else text
+
+
+def label(name: str) -> tuple[str, str]:
+    """Part a name from its unit: `range_sd_m` gives `("range sd", "m")`."""
+    for suffix, unit in UNITS.items():
+        if name.endswith(suffix):
+            return name.removesuffix(suffix).replace("_", " "), unit
+    return name.replace("_", " "), ""
+
+
+def number_cell(value: float | None, digits: int = 4) -> Cell:
+    """A right-aligned figure that sorts by its value."""
+    known = value is not None and math.isfinite(value)
+    return Cell(figure(value, digits), f"{value:.9g}" if known else "", is_figure=True)
+
+
+def text_cell(value: Any) -> Cell:
+    """A left-aligned text, escaped."""
+    text = "–" if value in (None, "") else str(value)
+    return Cell(escape(text), text)
+
+
+def table(
+    caption: str,
+    heads: Sequence[str],
+    rows: Iterable[Sequence[Cell]],
+    *,
+    name: str = "",
+    sortable: bool = False,
+    row_attributes: Sequence[str] = (),
+) -> str:
+    """Render a table; heads of a sortable one are buttons, and work where scripts do."""
+    body = []
+    for index, row in enumerate(rows):
+        attributes = row_attributes[index] if row_attributes else ""
+        body.append(f"<tr{attributes}>{''.join(map(_cell, row))}</tr>")
+    cells = "".join(_head(head, sortable=sortable) for head in heads)
+    marks = (f' id="{name}"' if name else "") + (' class="sortable"' if sortable else "")
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">'
+        f"<table{marks}><caption>{escape(caption)}</caption><thead><tr>{cells}</tr></thead>"
+        f"<tbody>{chr(10).join(body)}</tbody></table></div>"
+    )
+
+
+def _head(head: str, *, sortable: bool) -> str:
+    inside = f'<button type="button">{head}</button>' if sortable else head
+    return f'<th scope="col">{inside}</th>'
+
+
+def _cell(cell: Cell) -> str:
+    kind = ' class="n"' if cell.is_figure else ""
+    key = f' data-key="{escape(cell.key)}"' if cell.key and cell.key != cell.html else ""
+    return f"<td{kind}{key}>{cell.html}</td>"
+
+
+def panel(name: str, caption: str, *, alt: str) -> str:
+    """The empty place of a figure, with its caption and what it shows in words."""
+    return (
+        f'<figure><div class="chart" id="{name}" role="img" aria-label="{escape(alt)}"></div>'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
