@@ -28,7 +28,7 @@ from boresight.lanes import (
     pack_states,
     trace,
 )
-from boresight.maths import Gaussian, select
+from boresight.maths import Gaussian, elimination, select
 from boresight.models.components import Component
 from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, structure, with_numbers
@@ -66,12 +66,13 @@ class Guard(Protocol):
 
 
 def status_of(mean: Array, cov: Array) -> Any:
-    """`Status` of a state: not finite, not positive on its diagonal, or well."""
-    total = sum(abs(x) for x in mean)
-    finite = total * 0.0 < 1.0  # NaN and infinity fail this
-    positive = cov[0, 0] > 0.0
-    for i in range(1, len(mean)):
-        positive = positive & (cov[i, i] > 0.0)
+    """`Status` of a state: not finite, not positive definite, or well."""
+    total = sum(abs(x) for x in mean) + sum(abs(cov[i, i]) for i in range(len(mean)))
+    finite = total < np.inf  # NaN and infinity fail this
+    pivots = elimination(cov)
+    positive = pivots[0] > 0.0
+    for pivot in pivots[1:]:
+        positive = positive & (pivot > 0.0)
     bad = select(positive, float(Status.OK), float(Status.NOT_POSITIVE))
     return select(finite, bad, float(Status.NOT_FINITE))
 
@@ -190,6 +191,12 @@ class Estimate:
 def start_states(start: Gaussian, lanes: int) -> States:
     """Blocked states from a Gaussian whose leading axis is absent or (lanes,)."""
     n = np.shape(start.mean)[-1]
+    leading = {*np.shape(start.mean)[:-1], *np.shape(start.cov)[:-2]}
+    if np.shape(start.cov)[-2:] != (n, n) or leading - {1, lanes}:
+        raise UsageError(
+            f"a start with mean {np.shape(start.mean)} and cov {np.shape(start.cov)}",
+            why=f"it must be ({lanes}, n) and ({lanes}, n, n), or (n,) and (n, n)",
+        )
     slots = _state_slots(n)
     mean = np.broadcast_to(np.asarray(start.mean, dtype=float), (lanes, n))
     cov = np.broadcast_to(np.asarray(start.cov, dtype=float), (lanes, n, n))

@@ -72,8 +72,9 @@ def two_plots(first: Array, second: Array, dt: Array, motion: Motion, sensor: Se
     mean[:, d : 2 * d] = (after - before) / t
     cov[:, d : 2 * d, d : 2 * d] = (spread + later) / t[..., None] ** 2
     cov[:, :d, d : 2 * d] = cov[:, d : 2 * d, :d] = later / t[..., None]
-    moved = motion.noise(float(np.mean(t)))  # what the motion may have done in between
-    cov[:, d : 2 * d, d : 2 * d] += moved[d : 2 * d, d : 2 * d]
+    steps, which = np.unique(t[:, 0], return_inverse=True)
+    moved = np.stack([motion.noise(float(step)) for step in steps])[which]  # between the plots
+    cov[:, d : 2 * d, d : 2 * d] += moved[:, d : 2 * d, d : 2 * d]
     return Gaussian(mean, cov)
 
 

@@ -97,12 +97,17 @@ class Kernel:
             inputs: by name: FIXED (*shape), STEP (steps, *shape), LANE (lanes, *shape), EACH
                 (lanes, steps, *shape); LANE and EACH are blocked if the kernel is.
             steps: number of steps, at least 1.
-            threads: how many threads share the lanes; the result does not depend on it.
+            threads: how many threads share the lanes, at least 1; the result does not depend on it.
 
         Returns:
             The new states, and the outputs by name: EACH (lanes, steps, *shape), LANE
             (lanes, *shape); blocked and packed if the kernel is.
+
+        Raises:
+            UsageError: steps, threads, the state or an input does not fit; compiled code would
+                read past its memory.
         """
+        self._check(states, steps, threads)
         packed = [self._pack(slot, inputs, states.lanes, steps) for slot in self.program.inputs]
         if self.code is None:
             return self._run_numpy(states, packed, steps)
@@ -123,15 +128,28 @@ class Kernel:
             list(_pool().map(part, cuts[:-1].tolist(), cuts[1:].tolist()))
         return States(states.slots, new, states.lanes), self._unpack(outputs)
 
+    def _check(self, states: States, steps: int, threads: int) -> None:
+        if steps < 1 or threads < 1:
+            raise UsageError(f"a kernel runs at least one step; got {steps=}, {threads=}")
+        expected = (-(-states.lanes // BLOCK), self.program.state_size, BLOCK)
+        if states.data.shape != expected or not states.data.flags.c_contiguous:
+            names = ", ".join(f"{slot.name} {slot.leaf.shape}" for slot in self.program.state)
+            raise UsageError(
+                f"the state has blocks {states.data.shape}; {expected} is needed",
+                why=f"this kernel carries {names}",
+            )
+
     def _pack(self, slot: Slot, inputs: Mapping[str, Array], lanes: int, steps: int) -> Array:
         if slot.name not in inputs:
             raise UsageError(f"input {slot.name!r} is missing; got {sorted(inputs)}")
-        blocked = not self.rows and slot.rate & Rate.LANE
-        if blocked:
-            return np.ascontiguousarray(inputs[slot.name], dtype=float)
-        array = np.ascontiguousarray(slot.leaf.pack(inputs[slot.name]))
-        sizes = {Rate.FIXED: (), Rate.STEP: (steps,), Rate.LANE: (lanes,)}
-        expected = (*sizes.get(slot.rate, (lanes, steps)), slot.leaf.size)
+        sizes: dict[Rate, tuple[int, ...]] = {Rate.FIXED: (), Rate.STEP: (steps,)}
+        sizes |= {Rate.LANE: (lanes,), Rate.EACH: (lanes, steps)}
+        expected = (*sizes[slot.rate], slot.leaf.size)
+        if self.rows or not slot.rate & Rate.LANE:
+            array = np.ascontiguousarray(slot.leaf.pack(inputs[slot.name]))
+        else:
+            expected = (-(-lanes // BLOCK), *expected[1:], BLOCK)
+            array = np.ascontiguousarray(inputs[slot.name], dtype=float)
         if array.shape != expected:
             raise UsageError(
                 f"input {slot.name!r} has shape {np.shape(inputs[slot.name])}",
@@ -175,3 +193,7 @@ def make_kernel(program: Program, rows: bool = True) -> Kernel:  # noqa: FBT001,
 @cache
 def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="boresight")
+
+
+if hasattr(os, "register_at_fork"):  # a child inherits the pool without its threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)

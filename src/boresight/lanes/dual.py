@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from boresight.lanes.trace import Symbol, integer_power
+from boresight.lanes.trace import Symbol, forbid, recorded_power
 
 Array = Any  # float64 outside a trace, object (symbols) inside one
 
@@ -71,7 +71,7 @@ class Dual:
         return self.chain(other * inverse, -other * inverse * inverse)
 
     def __pow__(self, power: Any) -> Any:
-        return self.sqrt() if power == 0.5 else integer_power(self, int(power))
+        return recorded_power(self, power)
 
     def __pos__(self) -> "Dual":
         return self
@@ -82,6 +82,8 @@ class Dual:
 
     def __abs__(self) -> "Dual":
         return self.chain(abs(self.value), copysign(1.0, self.value))
+
+    fabs = __abs__
 
     def sqrt(self) -> "Dual":
         """Square root; its slope is infinite at zero, so guard the argument first."""
@@ -141,6 +143,9 @@ class Dual:
 
     def __ge__(self, other: Any) -> Any:
         return self.value >= _value(other)
+
+
+forbid(Dual)
 
 
 def _value(x: Any) -> Any:

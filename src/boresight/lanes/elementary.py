@@ -152,12 +152,21 @@ def arctan2(y: Any, x: Any) -> Any:
     return copysign(select(behind, math.pi - angle, angle), y)
 
 
+def _divide(x: Any, y: Any) -> Any:
+    """A quotient; by a constant it is a product, one unit in the last place from the quotient."""
+    c = y.graph.values[y.index]
+    if c is None or not 1e-300 < abs(c) < 1e300:
+        return x / y
+    return x.graph.apply("scale", x, y.graph.constant(1.0 / c))
+
+
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "sin": sin,
     "cos": cos,
     "exp": exp,
     "log": log,
     "arctan2": arctan2,
+    "div": _divide,
 }
 _ROUNDING: dict[str, Callable[..., Any]] = {"rint": rint, "floor": _floor}
 
@@ -177,12 +186,12 @@ def _spell(program: Program, functions: dict[str, Callable[..., Any]]) -> Progra
     graph = Graph()
     moved: list[Symbol] = []
     for op, args in program.nodes:
-        if op in ("const", "input"):
+        if op in functions:
+            moved.append(functions[op](*[moved[a] for a in args]))
+        elif op in ("const", "input"):
             moved.append(graph.intern(op, args))
-        elif op in functions:
-            moved.append(functions[op](*(moved[a] for a in args)))
-        else:
-            moved.append(graph.apply(op, *(moved[a] for a in args)))
+        else:  # folded already, and operands keep their order
+            moved.append(graph.intern(op, tuple([moved[a].index for a in args])))
     return assemble(
         graph,
         program.inputs,

@@ -17,14 +17,13 @@ Floating-point flag `contract` only: multiply and add may fuse, NaN and infinity
 every lane sees the same operations, so one lane and a million give the same bits.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from boresight.lanes.program import Program, Rate, Slot, is_condition
 
 BLOCK = 8  # lanes of one block in memory, whatever the processor
 _BINARY = {"add": "fadd contract", "sub": "fsub contract", "mul": "fmul contract"}
-_BINARY |= {"div": "fdiv contract"}
+_BINARY |= {"div": "fdiv contract", "scale": "fmul"}  # a scaled half turn must stay one: no fusing
 _CALLS = {"sqrt": "sqrt", "abs": "fabs", "rint": "rint", "floor": "floor", "copysign": "copysign"}
 _CONDITIONS = {"lt": "fcmp olt", "le": "fcmp ole", "isnan": "fcmp uno"}
 _LOGIC = {"and": "and", "or": "or"}
@@ -64,6 +63,11 @@ class _Writer:
         self.vector = _vector(shape.width)
         self.splats: dict[int, str] = {}
         self.temporaries = 0
+        self.kinds = [self.vector if rate & Rate.LANE else _SCALAR for rate in program.rates]
+        self.elements: dict[str, list[tuple[int, int]]] = {}  # of an input: (element, node)
+        for node, (op, args) in enumerate(program.nodes):
+            if op == "input":
+                self.elements.setdefault(args[0], []).append((args[1], node))
 
     def emit(self, text: str) -> str:
         self.temporaries += 1
@@ -74,9 +78,6 @@ class _Writer:
     def line(self, text: str) -> None:
         self.lines.append(text)
 
-    def kind(self, node: int) -> _Kind:
-        return self.vector if self.program.rates[node] & Rate.LANE else _SCALAR
-
     def constant(self, value: str, kind: _Kind, scalar: str = "double") -> str:
         return value if kind is _SCALAR else f"splat ({scalar} {value})"
 
@@ -86,7 +87,7 @@ class _Writer:
         if op == "const":
             bits = int.from_bytes(args[0], "little")
             return self.constant(f"0x{bits:016X}", kind)
-        if kind is _SCALAR or self.kind(node) is kind:
+        if kind is _SCALAR or self.kinds[node] is kind:
             return f"%n{node}"
         if node not in self.splats:
             self.splats[node] = self.splat(f"%n{node}", "i1" if is_condition(op) else "double")
@@ -100,13 +101,13 @@ class _Writer:
             f"shufflevector {kind} {first}, {kind} poison, <{w} x i32> zeroinitializer"
         )
 
-    def compute(self, rates: set[Rate]) -> None:
-        """Emit every operation of the given rates, in recorded order."""
+    def compute(self, wanted: Rate) -> None:
+        """Emit every operation of one rate, in recorded order."""
         for node, ((op, args), rate) in enumerate(
             zip(self.program.nodes, self.program.rates, strict=True)
         ):
-            if rate in rates and op not in ("const", "input"):
-                kind = self.kind(node)
+            if rate is wanted and op not in ("const", "input"):
+                kind = self.kinds[node]
                 self.line(f"  %n{node} = {self.operation(op, args, kind)}")
 
     def operation(self, op: str, args: tuple[int, ...], kind: _Kind) -> str:
@@ -153,17 +154,10 @@ class _Writer:
 
 def _scalar_loads(w: _Writer, slot: Slot, argument: str, base: str) -> None:
     """Numbers the lanes share: FIXED and STEP inputs."""
-    for k, node in _elements(w.program, slot.name):
+    for k, node in w.elements.get(slot.name, ()):
         index = w.emit(f"add i64 {base}, {k}")
         pointer = w.emit(f"getelementptr double, ptr {argument}, i64 {index}")
         w.line(f"  %n{node} = load double, ptr {pointer}, align 8")
-
-
-def _elements(program: Program, name: str) -> Iterator[tuple[int, int]]:
-    """(element, node) of the elements of an input that the program uses."""
-    for node, (op, args) in enumerate(program.nodes):
-        if op == "input" and args[0] == name:
-            yield args[1], node
 
 
 def _address(w: _Writer, argument: str, base: str, element: int) -> str:
@@ -271,7 +265,7 @@ def write_ir(program: Program, shape: Shape, name: str, attributes: str) -> str:
     for slot, argument in slots:
         if slot.rate == Rate.FIXED:
             _scalar_loads(w, slot, argument, "0")
-    w.compute({Rate.FIXED})
+    w.compute(Rate.FIXED)
     _precompute_splats(w, Rate.FIXED)
     w.line("  %some = icmp ult i64 %from, %to\n  br i1 %some, label %chunks, label %end\nchunks:")
     w.line("  %chunk = phi i64 [ %from, %entry ], [ %nextchunk, %done ]")
@@ -302,12 +296,12 @@ def _precompute_splats(w: _Writer, rate: Rate) -> None:
     users = {
         a
         for node, (op, args) in enumerate(w.program.nodes)
-        if op not in ("const", "input") and w.program.rates[node] & Rate.LANE
+        if op not in ("const", "input") and w.kinds[node] is w.vector
         for a in args
     }
     users.update(w.program.state_nodes, *w.program.output_nodes)
     for node in sorted(users):
-        if w.program.rates[node] == rate and w.program.nodes[node][0] != "const":
+        if w.program.rates[node] is rate and w.program.nodes[node][0] != "const":
             w.value(node, w.vector)
 
 
@@ -318,37 +312,36 @@ def _write_lane_part(
     old: dict[int, str] = {}
     for slot in w.program.state:
         name = f"state.{slot.name}"
-        for k, node in _elements(w.program, name):
+        for k, node in w.elements.get(name, ()):
             pointer = _state_pointer(w, "%old", base, _state_offset(w.program, name) + k)
             old[node] = w.emit(f"load {w.vector.number}, ptr {pointer}, align 8")
     bases = {}
     for slot, argument in slots:
         if slot.rate == Rate.LANE:
             start = _lane_base(w, argument, slot.leaf.size, "1")
-            for k, node in _elements(w.program, slot.name):
+            for k, node in w.elements.get(slot.name, ()):
                 w.line(f"  %n{node} = {_load(w, argument, start, k)}")
         elif slot.rate == Rate.EACH:
             bases[slot.name] = _lane_base(w, argument, slot.leaf.size, "%steps")
-    w.compute({Rate.LANE})
+    w.compute(Rate.LANE)
     return old, bases
 
 
 def _write_step(
     w: _Writer, slots: list[tuple[Slot, str]], old: dict[int, str], bases: dict[str, str]
 ) -> None:
-    program = w.program
     top = len(w.lines)
     for slot, argument in slots:
         if slot.rate == Rate.STEP:
             _scalar_loads(w, slot, argument, w.emit(f"mul i64 %t, {slot.leaf.size}"))
-    w.compute({Rate.STEP})
+    w.compute(Rate.STEP)
     _precompute_splats(w, Rate.STEP)
     for slot, argument in slots:
         if slot.rate == Rate.EACH:
             base = _step_base(w, bases[slot.name], slot.leaf.size)
-            for k, node in _elements(program, slot.name):
+            for k, node in w.elements.get(slot.name, ()):
                 w.line(f"  %n{node} = {_load(w, argument, base, k)}")
-    w.compute({Rate.EACH})
+    w.compute(Rate.EACH)
     w.lines[top:top] = _carried(w, old)
 
 
@@ -356,7 +349,7 @@ def _carried(w: _Writer, old: dict[int, str]) -> list[str]:
     """The state inside the loop: from memory on the first step, then from the step before."""
     lines, element = [], 0
     for slot in w.program.state:
-        for k, node in _elements(w.program, f"state.{slot.name}"):
+        for k, node in w.elements.get(f"state.{slot.name}", ()):
             following = w.value(w.program.state_nodes[element + k], w.vector)
             sources = f"[ {old[node]}, %chunks ], [ {following}, %step ]"
             lines.append(f"  %n{node} = phi {w.vector.number} {sources}")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import FormulaError, UsageError
-from boresight.lanes.trace import COMPARISONS, FOLD, Graph, Symbol, located
+from boresight.lanes.trace import COMPARISONS, FOLD, Graph, located
 
 Array = Any
 LARGEST = 8_000  # operations; compile time grows faster than linearly above it
@@ -27,6 +27,9 @@ class Rate(IntFlag):
     STEP = 1
     LANE = 2
     EACH = 3
+
+
+_RATES = tuple(Rate(i) for i in range(4))
 
 
 @dataclass(frozen=True)
@@ -159,8 +162,14 @@ class Program:
             else:
                 text = f"{op} " + ", ".join(f"%{a}" for a in args)
             lines.append(f"%{i} = {text}  # {rate.name}")
+        written, start = [], 0
+        for slot in self.state:
+            numbers = self.state_nodes[start : start + slot.leaf.size]
+            written.append((f"state.{slot.name}", numbers))
+            start += slot.leaf.size
         for slot, numbers in zip(self.outputs, self.output_nodes, strict=True):
-            lines.append(f"{slot.name} = " + ", ".join(f"%{n}" for n in numbers))
+            written.append((slot.name, numbers))
+        lines += [f"{name} = " + ", ".join(f"%{n}" for n in numbers) for name, numbers in written]
         return "\n".join(lines)
 
 
@@ -192,24 +201,19 @@ def trace(
     graph = Graph()
     slots = tuple(Slot(name, leaf, rate) for name, (leaf, rate) in inputs.items())
     states = tuple(Slot(name, leaf) for name, leaf in state.items())
+    wanted = tuple(Slot(name, leaf, rate) for name, (leaf, rate) in outputs.items())
     try:
         new_state, results = step(
             {s.name: _declare(graph, replace(s, name=f"state.{s.name}")) for s in states},
             {s.name: _declare(graph, s) for s in slots},
         )
+        state_nodes = [n for s in states for n in _nodes(graph, s, new_state)]
+        output_nodes = [_nodes(graph, s, results) for s in wanted]
     except FormulaError:
         raise
     except (TypeError, ValueError, ArithmeticError, AttributeError, np.linalg.LinAlgError) as error:
         raise located(error) from error
-    wanted = tuple(Slot(name, leaf, rate) for name, (leaf, rate) in outputs.items())
-    program = assemble(
-        graph,
-        slots,
-        states,
-        wanted,
-        [n for s in states for n in _nodes(graph, s, new_state)],
-        [_nodes(graph, s, results) for s in wanted],
-    )
+    program = assemble(graph, slots, states, wanted, state_nodes, output_nodes)
     if program.operations > LARGEST:
         raise FormulaError(
             f"the formula has {program.operations} operations; a kernel has at most {LARGEST}",
@@ -221,10 +225,14 @@ def trace(
 def _nodes(graph: Graph, slot: Slot, values: Mapping[str, Any]) -> list[int]:
     if slot.name not in values:
         raise UsageError(f"the formula has no output {slot.name!r}; it has {sorted(values)}")
-    return [
-        v.index if isinstance(v, Symbol) else graph.constant(v).index
-        for v in slot.leaf.flatten(values[slot.name])
-    ]
+    found = [graph.lift(v) for v in slot.leaf.flatten(values[slot.name])]
+    for v in found:
+        if v is None or graph.is_bool(v.index):
+            raise FormulaError(
+                f"{slot.name!r} is not made of numbers",
+                next_step="give floats or recorded numbers; select(condition, 1.0, 0.0) is one",
+            )
+    return [v.index for v in found if v is not None]
 
 
 def assemble(
@@ -243,23 +251,23 @@ def assemble(
             needed.update(args)
     order = sorted(needed)
     number = {old: new for new, old in enumerate(order)}
-    declared = {s.name: s.rate for s in inputs}
+    declared = {s.name: int(s.rate) for s in inputs}  # flags are slow to combine
     nodes: list[tuple[str, tuple[Any, ...]]] = []
-    rates: list[Rate] = []
+    rates: list[int] = []
     for old in order:
         op, args = graph.nodes[old]
-        rate = Rate.FIXED
+        rate = 0
         if op == "input":
-            rate = declared.get(args[0], Rate.EACH)
+            rate = declared.get(args[0], 3)
         elif op != "const":
-            args = tuple(number[a] for a in args)
+            args = tuple([number[a] for a in args])
             for a in args:
                 rate |= rates[a]
         nodes.append((op, args))
         rates.append(rate)
     return Program(
         tuple(nodes),
-        tuple(rates),
+        tuple([_RATES[rate] for rate in rates]),
         inputs,
         state,
         outputs,

@@ -6,6 +6,7 @@ beside its final name and moved into place, so two processes can write it at onc
 own checksum, so a cut or corrupt file is a miss and is written again.
 """
 
+import contextlib
 import ctypes
 import hashlib
 import os
@@ -23,6 +24,7 @@ from boresight.lanes.program import Program
 
 FORMAT = 1  # of the calling convention; part of every cached object's name
 _LOCK = threading.RLock()  # LLVM's contexts are not made for several threads
+_LOADED: dict[str, Any] = {}  # code by name: LLVM never frees a name, nor loads it twice
 
 
 @dataclass(frozen=True)
@@ -100,14 +102,16 @@ def _assemble(text: str, goal: Target) -> bytes:
     return bytes(machine.emit_object(module))
 
 
-def cache_folder() -> Path:
-    """Where compiled objects are kept: BORESIGHT_CACHE, else the user's cache folder."""
+def cache_folder() -> Path | None:
+    """Where compiled objects are kept: BORESIGHT_CACHE, else the user's cache folder, if any."""
     if own := os.environ.get("BORESIGHT_CACHE"):
         return Path(own)
-    if os.name == "nt":
-        base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
-        return Path(base) / "boresight" / "kernels"
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    try:
+        home = Path.home()
+    except RuntimeError:  # an account without a home
+        return None
+    usual = home / "AppData" / "Local" if os.name == "nt" else home / ".cache"
+    base = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME") or usual
     return Path(base) / "boresight" / "kernels"
 
 
@@ -117,11 +121,13 @@ def _read(path: Path) -> bytes | None:
         data = path.read_bytes()
     except OSError:
         return None
-    return data[:-32] if hashlib.sha256(data[:-32]).digest() == data[-32:] else None
+    code, checksum = data[:-32], data[-32:]
+    return code if code and hashlib.sha256(code).digest() == checksum else None
 
 
 def _write(path: Path, data: bytes) -> None:
     """Keep an object; a folder that cannot be written to only costs time."""
+    name = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".tmp")
@@ -129,11 +135,16 @@ def _write(path: Path, data: bytes) -> None:
             file.write(data + hashlib.sha256(data).digest())
         os.replace(name, path)  # noqa: PTH105 - the name is a string from mkstemp
     except OSError:
-        return
+        if name is not None:
+            with contextlib.suppress(OSError):
+                os.unlink(name)  # noqa: PTH108 - as above
 
 
 def _object(text: str, name: str, goal: Target) -> bytes:
-    path = cache_folder() / f"{name}.o"
+    folder = cache_folder()
+    if folder is None:
+        return _assemble(text, goal)
+    path = folder / f"{name}.o"
     data = _read(path)
     if data is None:
         data = _assemble(text, goal)
@@ -187,9 +198,11 @@ def _compile(program: Program, shape: Shape, goal: Target) -> Code:
     cpu = goal.cpu or llvm.get_host_cpu_name()
     identity = f"{FORMAT} {version} {cpu} {goal.features} O1\n{text}"
     name = "k" + hashlib.sha256(identity.encode()).hexdigest()[:40]
-    data = _object(text.replace("@kernel(", f"@{name}(", 1), name, goal)
-    library = llvm.JITLibraryBuilder().add_object_img(data).export_symbol(name)
-    resources = library.link(_jit(), name)
+    resources = _LOADED.get(name)
+    if resources is None:  # two programs may share their code
+        data = _object(text.replace("@kernel(", f"@{name}(", 1), name, goal)
+        library = llvm.JITLibraryBuilder().add_object_img(data).export_symbol(name)
+        resources = _LOADED[name] = library.link(_jit(), name)
     count = 2 + len(program.inputs) + len(program.outputs)
     kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4, *[ctypes.c_void_p] * count)
     return Code(program, shape, goal, kind(resources[name]), resources)

@@ -8,6 +8,7 @@ Structural zeros are folded: `0 * x` is 0 even where x might be NaN or infinite.
 six-state filter has twice the operations; with it, a formula must not rely on `0 * nan`.
 """
 
+import os
 import struct
 import sys
 from collections.abc import Callable
@@ -20,14 +21,18 @@ from boresight.errors import FormulaError
 
 # Operations that only a boolean results from; everything else is a float.
 COMPARISONS = frozenset({"lt", "le", "isnan", "and", "or", "not"})
-_HERE = str(Path(__file__).parent)
-_NUMPY = str(Path(np.__file__).parent)
+_LOGIC = frozenset({"and", "or", "not"})  # of conditions; the other comparisons are of numbers
+_COMMUTE = frozenset({"add", "mul", "and", "or"})
+_ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
+_UNITS = (1.0, -1.0)
+_INNER = (f"{Path(__file__).parent}{os.sep}", f"{Path(np.__file__).parent}{os.sep}", "<frozen")
 
 FOLD: dict[str, Callable[..., Any]] = {
     "add": np.add,
     "sub": np.subtract,
     "mul": np.multiply,
     "div": np.divide,
+    "scale": np.multiply,
     "neg": np.negative,
     "abs": np.abs,
     "sqrt": np.sqrt,
@@ -55,7 +60,7 @@ FOLD: dict[str, Callable[..., Any]] = {
 def _place() -> str:
     """File and line of the formula: the innermost frame outside this folder and NumPy."""
     frame = sys._getframe(1)  # noqa: SLF001 - the only way to name the caller's line cheaply
-    while frame.f_back and frame.f_code.co_filename.startswith((_HERE, _NUMPY, "<")):
+    while frame.f_back and frame.f_code.co_filename.startswith(_INNER):
         frame = frame.f_back
     return f"{frame.f_code.co_filename}, line {frame.f_lineno}"
 
@@ -74,30 +79,37 @@ class Graph:
 
     def __init__(self) -> None:
         self.nodes: list[tuple[str, tuple[Any, ...]]] = []
+        self.values: list[float | None] = []  # of each node that is a constant
         self._known: dict[tuple[str, tuple[Any, ...]], int] = {}
 
     def constant(self, value: float) -> "Symbol":
         """A constant, told from others by its bit pattern (0.0 is not -0.0)."""
-        return self.intern("const", (struct.pack("<d", float(value)),))
+        return self.intern("const", (struct.pack("<d", value),))
 
     def input(self, name: str, element: int) -> "Symbol":
         """Element `element` of the declared input `name`."""
         return self.intern("input", (name, element))
 
+    def lift(self, value: Any) -> "Symbol | None":
+        """`value` as a symbol of this trace; None if it is no number (an array, a dual number)."""
+        if isinstance(value, Symbol):
+            if value.graph is not self:
+                _refuse("it mixes symbols of two traces", "pass the value in as a declared input")
+            return value
+        if isinstance(value, int | float | np.floating | np.integer):
+            return self.constant(float(value))
+        return None
+
     def apply(self, op: str, *args: "Symbol") -> "Symbol":
         """Record `op` on `args`, folding what is known now."""
+        self._check(op, args)
         simpler = self._simplify(op, args)
         if simpler is not None:
             return simpler
-        numbers = tuple(a.index for a in args)
-        if op in ("add", "mul", "and", "or"):
-            numbers = tuple(sorted(numbers))
+        numbers = tuple([a.index for a in args])
+        if op in _COMMUTE and numbers[0] > numbers[1]:
+            numbers = numbers[::-1]
         return self.intern(op, numbers)
-
-    def value(self, index: int) -> float | None:
-        """The constant at `index`, or None."""
-        op, args = self.nodes[index]
-        return float(struct.unpack("<d", args[0])[0]) if op == "const" else None
 
     def is_bool(self, index: int) -> bool:
         """Whether node `index` is a condition."""
@@ -110,48 +122,55 @@ class Graph:
         if index is None:
             index = self._known[key] = len(self.nodes)
             self.nodes.append(key)
+            self.values.append(struct.unpack("<d", args[0])[0] if op == "const" else None)
         return Symbol(self, index)
 
+    def _check(self, op: str, args: tuple["Symbol", ...]) -> None:
+        """Conditions and numbers are different things: a compiled kernel cannot mix them."""
+        for position, argument in enumerate(args):
+            is_condition = self.nodes[argument.index][0] in COMPARISONS
+            if is_condition is (op in _LOGIC or (op == "select" and position == 0)):
+                continue
+            if is_condition:
+                _refuse("it calculates with a condition", "use select(condition, 1.0, 0.0)")
+            _refuse("it takes a number for a condition", "compare it first, as in x < 0.0")
+
     def _simplify(self, op: str, args: tuple["Symbol", ...]) -> "Symbol | None":
-        values = [self.value(a.index) for a in args]
+        if op in _ARITHMETIC:
+            x, y = args
+            u, v = self.values[x.index], self.values[y.index]
+            if u is None or v is None:
+                return None if u is v else self._identity(op, x, y, u, v)
+            return self._fold(op, [u, v])
         if op == "select":
-            if args[1].index == args[2].index:
-                return args[1]
-        elif op in ("and", "or", "not"):
+            return args[1] if args[1].index == args[2].index else None
+        if op in COMPARISONS:
             return None
-        elif None not in values and op not in COMPARISONS:
-            with np.errstate(all="ignore"):
-                return self.constant(FOLD[op](*map(np.float64, values)))
-        elif op == "neg" and self.nodes[args[0].index][0] == "neg":
+        if op == "neg" and self.nodes[args[0].index][0] == "neg":
             return Symbol(self, self.nodes[args[0].index][1][0])
-        return self._identity(op, args, values)
+        values = [self.values[a.index] for a in args]
+        return None if None in values else self._fold(op, values)
+
+    def _fold(self, op: str, values: list[float | None]) -> "Symbol":
+        with np.errstate(all="ignore"):
+            return self.constant(float(FOLD[op](*map(np.float64, values))))
 
     def _identity(
-        self, op: str, args: tuple["Symbol", ...], values: list[float | None]
+        self, op: str, x: "Symbol", y: "Symbol", u: float | None, v: float | None
     ) -> "Symbol | None":
         """Zeros and ones that are there by structure. Never reassociates, never `x - x -> 0`."""
-        if len(args) != 2:
-            return None
-        (x, y), (u, v) = args, values
-        rules: dict[str, list[tuple[bool, Callable[[], Symbol]]]] = {
-            "add": [(u == 0, lambda: y), (v == 0, lambda: x)],
-            "sub": [(v == 0, lambda: x), (u == 0, lambda: -y)],
-            "mul": [
-                (u == 0 or v == 0, lambda: self.constant(0.0)),
-                (u == 1, lambda: y),
-                (v == 1, lambda: x),
-                (u == -1, lambda: -y),
-                (v == -1, lambda: -x),
-            ],
-            "div": [
-                (u == 0, lambda: self.constant(0.0)),
-                (v == 1, lambda: x),
-                (v == -1, lambda: -x),
-            ],
-        }
-        for holds, result in rules.get(op, ()):
-            if holds:
-                return result()
+        if op == "add":
+            return y if u == 0 else x if v == 0 else None
+        if op == "sub":
+            return x if v == 0 else -y if u == 0 else None
+        if op == "mul" and (u == 0 or v == 0):
+            return self.constant(0.0)
+        if op == "mul" and u in _UNITS:
+            return y if u == 1 else -y
+        if op == "div" and u == 0:
+            return self.constant(0.0)
+        if op in ("mul", "div") and v in _UNITS:
+            return x if v == 1 else -x
         return None
 
 
@@ -189,13 +208,7 @@ class Symbol:
 
     def lift(self, other: Any) -> "Symbol | None":
         """`other` as a symbol of this trace; None if NumPy should handle it (an array)."""
-        if isinstance(other, Symbol):
-            if other.graph is not self.graph:
-                _refuse("it mixes symbols of two traces", "pass the value in as a declared input")
-            return other
-        if isinstance(other, int | float | np.floating | np.integer):
-            return self.graph.constant(float(other))
-        return None
+        return self.graph.lift(other)
 
     def _lifted(self, other: Any, name: str) -> "Symbol":
         symbol = self.lift(other)
@@ -238,15 +251,20 @@ class Symbol:
         return (self * self + other * other).sqrt()
 
     def __pow__(self, power: Any) -> Any:
-        if isinstance(power, int | np.integer) or (isinstance(power, float) and power.is_integer()):
-            return integer_power(self, int(power))
-        if power == 0.5:
-            return self.sqrt()
-        return _refuse(f"power {power!r}", "write it with sqrt, exp and log")
+        return recorded_power(self, power)
 
     def __repr__(self) -> str:
-        value = self.graph.value(self.index)
+        value = self.graph.values[self.index]
         return f"<number %{self.index}>" if value is None else f"<constant {value!r}>"
+
+
+def recorded_power(base: Any, power: Any) -> Any:
+    """`base ** power` for whole powers and the square root; refuses all others."""
+    if isinstance(power, int | np.integer) or (isinstance(power, float) and power.is_integer()):
+        return integer_power(base, int(power))
+    if isinstance(power, float) and power == 0.5:
+        return base.sqrt()
+    return _refuse(f"power {power!r}", "write it with sqrt, exp and log")
 
 
 def integer_power(base: Any, power: int) -> Any:
@@ -260,49 +278,57 @@ def integer_power(base: Any, power: int) -> Any:
     return square * base if half is not None and power % 2 else square
 
 
-def _forbid(names: str, what: str, cure: str) -> None:
-    for name in names.split():
+_FORBIDDEN = (
+    (
+        "__bool__",
+        "it branches on a value (if, and, or, min, max, np.where, sort, ...)",
+        "use boresight.maths.select(condition, a, b)",
+    ),
+    (
+        "__float__ __int__ __index__ __complex__ __trunc__",
+        "it turns a recorded number into a Python number ({}), as math.* and float arrays do",
+        "use NumPy functions, and build arrays with np.array, np.block or np.eye(n) * x",
+    ),
+    ("__eq__ __ne__", "it compares for equality", "use <, <= and boresight.maths.select"),
+    (
+        "__mod__ __rmod__ __floordiv__ __rfloordiv__ __divmod__ __rdivmod__ __round__",
+        "it uses {}",
+        "use boresight.maths.wrap, or np.rint and np.floor",
+    ),
+    ("__rpow__", "it has a recorded number as exponent", "write it with np.exp and np.log"),
+    (
+        "__reduce__ __reduce_ex__ __copy__ __deepcopy__",
+        "it copies or pickles a recorded number",
+        "keep symbols inside the formula",
+    ),
+    (
+        """tan arcsin arccos arctan sinh cosh tanh arcsinh arccosh arctanh log1p log2 log10 expm1
+        exp2 cbrt ceil __ceil__ trunc deg2rad rad2deg degrees radians""",
+        "np.{} has no recorded form",
+        "write it with sqrt, exp, log, sin, cos, arctan2, rint and floor",
+    ),
+)
 
-        def refuse(self: Any, *args: Any, _name: str = name, **kwargs: Any) -> NoReturn:
-            del self, args, kwargs
-            _refuse(what.format(_name.strip("_")), cure)
 
-        setattr(Symbol, name, refuse)
+def forbid(kind: type) -> None:
+    """Make a class of numbers raise `FormulaError` for all that cannot be recorded."""
+    for names, what, cure in _FORBIDDEN:
+        for name in names.split():
+
+            def refuse(
+                self: Any,
+                *args: Any,
+                _what: str = what.format(name.strip("_")),
+                _cure: str = cure,
+                **kwargs: Any,
+            ) -> NoReturn:
+                del self, args, kwargs
+                _refuse(_what, _cure)
+
+            setattr(kind, name, refuse)
 
 
-_forbid(
-    "__bool__",
-    "it branches on a value (if, and, or, min, max, np.where, sort, ...)",
-    "use boresight.maths.select(condition, a, b)",
-)
-_forbid(
-    "__float__ __int__ __index__ __complex__ __trunc__",
-    "it turns a recorded number into a Python number ({}), as math.* and float arrays do",
-    "use NumPy functions, and build arrays with np.array, np.block or np.eye(n) * x",
-)
-_forbid("__eq__ __ne__", "it compares for equality", "use <, <= and boresight.maths.select")
-_forbid(
-    "__mod__ __rmod__ __floordiv__ __rfloordiv__ __divmod__ __rdivmod__ __round__",
-    "it uses {}",
-    "use boresight.maths.wrap, or np.rint and np.floor",
-)
-_forbid("__rpow__", "it has a recorded number as exponent", "write it with np.exp and np.log")
-_forbid(
-    "__reduce__ __reduce_ex__ __copy__ __deepcopy__",
-    "it copies or pickles a recorded number",
-    "keep symbols inside the formula",
-)
-_forbid(
-    "__iter__ __len__ __getitem__",
-    "it treats a recorded number as a sequence",
-    "declare the input as a Vector or Matrix",
-)
-_forbid(
-    "tan arcsin arccos arctan sinh cosh tanh arcsinh arccosh arctanh log1p log2 log10 expm1 "
-    "exp2 cbrt ceil __ceil__ trunc deg2rad rad2deg degrees radians",
-    "np.{} has no recorded form",
-    "write it with sqrt, exp, log, sin, cos, arctan2, rint and floor",
-)
+forbid(Symbol)
 
 
 def located(error: BaseException) -> FormulaError:
@@ -310,7 +336,7 @@ def located(error: BaseException) -> FormulaError:
     place, step = "", error.__traceback__
     while step:
         name = step.tb_frame.f_code.co_filename
-        if not name.startswith((_HERE, _NUMPY, "<")):
+        if not name.startswith(_INNER):
             place = f"{name}, line {step.tb_lineno}"
         step = step.tb_next
     return FormulaError(

@@ -3,7 +3,15 @@
 from boresight.lanes import copysign, gradient, isnan, jacobian, select
 from boresight.maths.angles import wrap
 from boresight.maths.gaussian import Gaussian
-from boresight.maths.linalg import cholesky, joseph, lower_solve, mirror, solve, upper_solve
+from boresight.maths.linalg import (
+    cholesky,
+    elimination,
+    joseph,
+    lower_solve,
+    mirror,
+    solve,
+    upper_solve,
+)
 
 missing = isnan  # a component of a plot that is NaN was not measured
 
@@ -11,6 +19,7 @@ __all__ = [
     "Gaussian",
     "cholesky",
     "copysign",
+    "elimination",
     "gradient",
     "isnan",
     "jacobian",

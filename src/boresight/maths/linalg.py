@@ -47,6 +47,25 @@ def cholesky(A: Array) -> tuple[Array, Array]:
     return np.array(L), np.array(inverse)
 
 
+def elimination(A: Array) -> list[Any]:
+    """Pivots of Gauss's elimination, all positive just where A is positive definite.
+
+    Args:
+        A: (n, n) symmetric; only the upper triangle is read. No square root is taken, so nothing
+            here is NaN before the first pivot that is zero.
+    """
+    n = len(A)
+    rows = [[A[i, j] for j in range(n)] for i in range(n)]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for k in range(n - 1):
+            inverse = 1.0 / rows[k][k]
+            for i in range(k + 1, n):
+                factor = rows[k][i] * inverse
+                for j in range(i, n):
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+    return [rows[k][k] for k in range(n)]
+
+
 def lower_solve(L: Array, inverse: Array, b: Array) -> Array:
     """Solve L x = b for b (n,) or (n, m), given 1 / diag(L)."""
     x: list[Any] = []
