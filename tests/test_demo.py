@@ -1,7 +1,7 @@
 """The shipped recording reads back: counts, physics, and the errors that were planted in it."""
 
 import json
-from importlib.resources import files
+from importlib.resources import as_file, files
 
 import numpy as np
 import polars as pl
@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from boresight.experiments import demo
 from boresight.experiments.truth import Motion, Truth
 from boresight.formats.asterix import decode
+from boresight.formats.recording import read_recording
 from boresight.formats.specs import edition
 from boresight.maths import frames
 from boresight.maths.angles import wrap
@@ -335,3 +336,71 @@ def test_errors_drawn_from_the_stated_covariance_are_called_consistent(truth, sc
     assert (low < found.anees < high) == (scale == 1.0)
     # chi-square over 204 degrees of freedom, tables: 166.3 and 245.5 (Wilson and Hilferty)
     assert (low, high) == pytest.approx((0.815, 1.203), abs=0.003)
+
+
+@pytest.fixture(scope="module")
+def tables():
+    with as_file(FOLDER / "recording.ast") as path:
+        return read_recording(path)
+
+
+def test_the_reader_finds_what_the_builder_states(tables):
+    assert tables.summary["skipped_bytes"] == 0
+    assert tables.summary["damaged"] == []
+    found = {entry["category"]: entry for entry in tables.summary["categories"]}
+    for category, entry in found.items():
+        assert entry["records"] == FACTS["counts"][f"cat{category:03d}"]
+    assert found[48]["scan_s"] == pytest.approx(RADAR["scan_s"], abs=0.02)
+    north = tables.sectors.filter(message="north")
+    place = north.select("latitude_deg", "longitude_deg", "height_m").unique().rows()
+    assert place == [(SITE.latitude_deg, SITE.longitude_deg, SITE.height_m)]
+
+
+def test_the_monitor_scatters_by_the_planted_noise_about_the_planted_place(tables):
+    monitor, scans = tables.plots.filter("fixed_transponder"), RADAR["scans"]
+    assert monitor["address"].unique().to_list() == [RADAR["monitor"]["address"]]
+    delay = excess(np.array([RADAR["monitor"]["range_m"]]), RADAR["monitor"]["height_m"])[0]
+    expected = {
+        "range_m": (RADAR["monitor"]["range_m"] + RADAR["range_bias_m"] + delay, 30.0),
+        "azimuth_deg": (RADAR["monitor"]["azimuth_deg"] + RADAR["azimuth_bias_deg"], 0.08),
+    }
+    for name, (mean, sd) in expected.items():
+        assert monitor[name].mean() == pytest.approx(mean, abs=3 * sd / np.sqrt(scans))
+        assert monitor[name].std() == pytest.approx(sd, rel=3 / np.sqrt(2 * scans))
+
+
+def test_pressure_height_and_height_are_apart_by_the_stated_law(tables):
+    heard = tables.reference.filter(pl.col("height_m") > 0)
+    offset = heard["height_m"] - 1.02 * heard["pressure_altitude_m"]
+    assert offset.mean() == pytest.approx(35.0, abs=8.0)  # weather and GPS, some dozens of each
+    assert (offset - 35.0).abs().max() < 12.0 + 5 * 5.0 + 8.0  # weather, GPS, quanta
+
+
+def test_what_aircraft_say_of_themselves_is_what_they_do(tables, truth):
+    said = tables.plots.filter(pl.col("roll_deg").is_not_null())
+    keys = pl.DataFrame(FACTS["flights"]).with_row_index("flight").select("flight", "address")
+    said = said.join(keys, on="address", maintain_order="left")
+    motion = truth.at(said["flight"].to_numpy(), said["time_s"].to_numpy() - RADAR["time_bias_s"])
+    azimuth = np.radians(said["azimuth_deg"].to_numpy())
+    direct = np.abs(wrap(azimuth - frames.polar_from_enu(motion.position).azimuth)) < 0.02
+    assert (~direct).sum() <= FACTS["counts"]["reflection"]  # these were said at another instant
+    said, motion = said.filter(direct), Motion(*(part[direct] for part in motion))
+    speed = np.hypot(motion.velocity[:, 0], motion.velocity[:, 1])
+    track = np.arctan2(motion.velocity[:, 0], motion.velocity[:, 1])
+    # North at the site and North at the aircraft differ by up to 1.5 degrees at 150 km.
+    off = wrap(np.radians(said["true_track_deg"].to_numpy()) - track)
+    assert np.degrees(np.abs(off)).max() < 2.0
+    assert np.abs(said["ground_speed_mps"].to_numpy() - speed).max() < 2.0
+    turning = said["roll_deg"].abs() > 20
+    assert 200 < turning.sum() < 1_500
+
+
+def test_each_adsb_fault_is_in_the_file_and_can_be_told(tables):
+    names = {flight["address"]: flight["callsign"] for flight in FACTS["flights"]}
+    heard = tables.reference
+    late = heard.filter(time_kind="reception")["address"].unique().to_list()
+    poor = heard.filter(pl.col("accuracy_m") > 500)["address"].unique().to_list()
+    silent = set(names) - set(heard["address"].unique().to_list())
+    assert sorted(names[address] for address in late) == FACTS["adsb"]["late"]
+    assert sorted(names[address] for address in poor) == FACTS["adsb"]["poor"]
+    assert sorted(names[address] for address in silent) == FACTS["adsb"]["without"]
