@@ -113,9 +113,9 @@ class Records:
         cells = self.cells(path)
         if cells is None:
             return np.zeros(len(self), "S1")
-        letters = _letters(cells.raw, cells.field)
-        values = np.zeros(len(self), letters.dtype)
-        values[cells.record] = letters
+        texts = letters(cells.raw, cells.field)
+        values = np.zeros(len(self), texts.dtype)
+        values[cells.record] = texts
         return np.strings.rstrip(values, b" ")
 
     def explicit(self, path: str) -> list[bytes | None]:
@@ -205,14 +205,14 @@ def read_bits(buffer: Octets, at: Integers, field: Field) -> NDArray[np.int64]:
     return values
 
 
-def _letters(raw: NDArray[np.int64], field: Field) -> NDArray[np.bytes_]:
-    """Turn numbers into text: six-bit or ASCII characters, or octal digits."""
+def letters(raw: NDArray[np.int64], field: Field) -> NDArray[np.bytes_]:
+    """Return (n,) text of raw numbers: six-bit or ASCII characters, or octal digits."""
     bits = {"c": 6, "a": 8, "o": 3}[field.kind]
     count = field.width // bits
     shifts = np.arange(count - 1, -1, -1) * bits
     codes = (raw[:, None] >> shifts) & ((1 << bits) - 1)
     if field.kind == "c":
-        letters = _SIX_BIT[codes]
+        octets = _SIX_BIT[codes]
     else:
-        letters = (codes + (ord("0") if field.kind == "o" else 0)).astype(np.uint8)
-    return np.ascontiguousarray(letters).view(f"S{count}")[:, 0]
+        octets = (codes + (ord("0") if field.kind == "o" else 0)).astype(np.uint8)
+    return np.ascontiguousarray(octets).view(f"S{count}")[:, 0]

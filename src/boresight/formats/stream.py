@@ -126,7 +126,7 @@ def _refuse_other_formats(path: Path, account: Account) -> None:
     """Raise if nothing was decoded, or so little that chance explains it."""
     if account.decoded and account.skipped <= 0.9 * account.bytes:
         return
-    if account.unknown and not account.decoded:
+    if account.unknown and not account.decoded and 2 * account.skipped < account.bytes:
         what = ", ".join(
             f"{category} ({n} blocks)" for category, n in sorted(account.unknown.items())
         )
