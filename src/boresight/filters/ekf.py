@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from boresight.errors import UsageError
 from boresight.filters import kalman
 from boresight.filters.posterior import Posterior, innovation, tally
 from boresight.maths import Gaussian, gradient, mirror, select
@@ -142,6 +143,8 @@ def update_iterated(
     Returns:
         The last iterate; NIS and likelihood are those of the prediction.
     """
+    if iterations < 1:
+        raise UsageError(f"{iterations=} is less than one")
     first = post = update(prior, z, components)
     for _ in range(iterations - 1):
         nu, H, noise, seen = linearise(components, z, post.mean)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from boresight.errors import UsageError
 from boresight.filters.posterior import Posterior, tally
 from boresight.maths import (
     Gaussian,
@@ -24,7 +25,7 @@ from boresight.maths import (
     select,
     upper_solve,
 )
-from boresight.models.components import Component
+from boresight.models.components import FORMULAS, Component
 from boresight.models.motion import Motion
 
 Array = Any
@@ -100,7 +101,17 @@ def update_plot(prior: Gaussian, z: Array, components: Sequence[Component]) -> P
         prior: predicted mean (n,), cov (n, n).
         z: plot (k,), NaN where missing.
         components: what the plot measures; gradients are taken at the prediction.
+
+    Raises:
+        UsageError: a component is known not to be linear.
     """
+    curved = [component.name for component in components if component.name in FORMULAS]
+    if curved:
+        raise UsageError(
+            f"the linear Kalman filter cannot use {curved[0]}",
+            why="it is not linear in the state",
+            next_step="use ekf",
+        )
     pairs = [gradient(component.value, prior.mean) for component in components]
     H = np.array([h for _, h in pairs])
     offset = np.array([value - h @ prior.mean for value, h in pairs])

@@ -11,14 +11,15 @@ right at the point it was derived for, so the sequential form offers four readin
     second order  mu from the covariance the angles have left, and its variance added
     none          no mu
 
-Range with both angles measured, slant and three-dimensional, or planar with azimuth alone.
+Slant range in three dimensions, or range in the plane, with the angles that are measured.
 """
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from boresight.errors import UsageError
 from boresight.filters import kalman
 from boresight.filters.ekf import (
     ANGLES_FIRST,
@@ -32,17 +33,27 @@ from boresight.models.components import Component
 
 Array = Any
 Mu = Literal["printed", "predicted", "second order", "none"]
+_SEQUENTIAL = "use the sequential filter, mekf, to choose between readings of mu"
 
 
 def _angles(components: Sequence[Component]) -> list[tuple[int, Component]]:
     return [(i, c) for i, c in enumerate(components) if c.is_angle]
 
 
-def _weights(components: Sequence[Component], mean: Array) -> dict[str, Any]:
-    """cos² of the elevation for azimuth terms, 1 for elevation terms (erratum K3)."""
-    elevation = next((c for c in components if c.name == "elevation_rad"), None)
-    cos = np.cos(elevation.value(mean)) if elevation else 1.0
-    return {"azimuth_rad": cos * cos, "elevation_rad": 1.0}
+def _weights(components: Sequence[Component], mean: Array, distance: Any) -> dict[str, Any]:
+    """cos² of the elevation for azimuth terms, 1 for elevation terms (erratum K3).
+
+    Where no elevation is measured it follows from the azimuth's gradient, 1 / (distance cos).
+    """
+    named = {component.name: component for component in components}
+    weights = {"elevation_rad": 1.0}
+    if "elevation_rad" in named:
+        cos = np.cos(named["elevation_rad"].value(mean))
+        weights["azimuth_rad"] = cos * cos
+    elif "azimuth_rad" in named:
+        _, h = gradient(named["azimuth_rad"].value, mean)
+        weights["azimuth_rad"] = 1.0 / (distance * distance * (h @ h))
+    return weights
 
 
 def _curvature(
@@ -52,7 +63,7 @@ def _curvature(
 
     kashyap (11) and aditya (16), (17) with errata K3 and A4; an angle that is missing adds nothing.
     """
-    weights = _weights(components, mean)
+    weights = _weights(components, mean, distance)
     mu, variance = 0.0, 0.0
     for i, angle in _angles(components):
         there, nu = innovation(angle, z[i], angle.value(mean))
@@ -67,7 +78,7 @@ def _second_order(
 ) -> tuple[Any, Any]:
     """Second-order mean and variance of the range at an updated point (erratum K4)."""
     mean, cov = latest
-    weights = _weights(components, mean)
+    weights = _weights(components, mean, distance)
     rows = [(weights[a.name], gradient(a.value, mean)[1]) for _, a in _angles(components)]
     mu, variance = 0.0, 0.0
     for w, h in rows:
@@ -96,6 +107,8 @@ def update_block(
         added_variance: whether the artificial variance (16) is added to the range.
     """
     nu, H, noise, seen = linearise(components, z, prior.mean)
+    if not isinstance(mu, bool):
+        raise UsageError(f"mu={mu!r} is neither True nor False", next_step=_SEQUENTIAL)
     for i, component in enumerate(components):
         if component.name == "range_m":
             distance = component.value(prior.mean)
@@ -124,6 +137,8 @@ def update(
         mu: which reading of the range correction; see the module.
         added_variance: whether the range's variance grows by that of the correction.
     """
+    if mu not in get_args(Mu):
+        raise UsageError(f"mu={mu!r} is no reading", next_step=f"use one of {get_args(Mu)}")
 
     def correct(component: Component, latest: Gaussian) -> Correction:
         if component.name != "range_m":

@@ -15,7 +15,11 @@ from boresight.models.sensors import PositionSensor, Radar, Sensor
 
 Array = Any
 SPEED_MPS = 300.0  # spread of an unknown velocity, each axis: covers airliners
-ACCELERATION_MPS2 = 10.0  # spread of further states: 1 g
+_SPREADS = {  # of further states, by the unit that ends their name
+    "mps2": 10.0,  # 1 g
+    "radps": 0.1,  # twice the standard rate of turn
+    "m": 300.0,  # what weather makes of a pressure altitude
+}
 
 
 def random_draw(prior: Gaussian, generator: np.random.Generator, lanes: int) -> Gaussian:
@@ -50,7 +54,8 @@ def one_plot(z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float = SPE
     cov = np.zeros((len(position), n, n))
     mean[:, :dims], cov[:, :dims, :dims] = position, spread
     for i in range(dims, n):
-        cov[:, i, i] = (speed_mps if i < 2 * dims else ACCELERATION_MPS2) ** 2
+        unit = motion.names[i].rsplit("_", 1)[-1]
+        cov[:, i, i] = (speed_mps if i < 2 * dims else _SPREADS[unit]) ** 2
     return Gaussian(mean, cov)
 
 
@@ -73,8 +78,10 @@ def two_plots(first: Array, second: Array, dt: Array, motion: Motion, sensor: Se
     cov[:, d : 2 * d, d : 2 * d] = (spread + later) / t[..., None] ** 2
     cov[:, :d, d : 2 * d] = cov[:, d : 2 * d, :d] = later / t[..., None]
     steps, which = np.unique(t[:, 0], return_inverse=True)
-    moved = np.stack([motion.noise(float(step)) for step in steps])[which]  # between the plots
-    cov[:, d : 2 * d, d : 2 * d] += moved[:, d : 2 * d, d : 2 * d]
+    Q = np.stack([motion.noise(float(step)) for step in steps])[which]
+    x, v, T = slice(0, d), slice(d, 2 * d), t[..., None]
+    # What the motion did in between: (noise of the velocity) - (noise of the position) / T.
+    cov[:, v, v] += Q[:, v, v] - (Q[:, x, v] + Q[:, v, x]) / T + Q[:, x, x] / T**2
     return Gaussian(mean, cov)
 
 
@@ -82,10 +89,14 @@ def locate(z: Array, motion: Motion, sensor: Sensor) -> tuple[Array, Array]:
     """Position (lanes, dims) of each plot in the track frame, and its covariance."""
     z = np.atleast_2d(np.asarray(z, dtype=float))
     if isinstance(sensor, PositionSensor):
-        sigmas = np.array([getattr(sensor, name) for name in sensor.names], dtype=float)
-        return z[:, : motion.dims], np.broadcast_to(
-            np.diag(sigmas**2), (len(z), *2 * [len(sigmas)])
-        )
+        if len(sensor.names) < motion.dims:
+            raise UsageError(
+                f"a plot of {', '.join(sensor.names)} does not say where the target is",
+                next_step=_GIVE,
+            )
+        sigmas = [np.broadcast_to(_first(getattr(sensor, n)), len(z)) for n in sensor.names]
+        variances = np.stack(sigmas, axis=-1)[:, : motion.dims] ** 2
+        return z[:, : motion.dims], variances[:, :, None] * np.eye(motion.dims)
     if not isinstance(sensor, Radar):
         raise UsageError(f"no start from one plot of a {type(sensor).__name__}", next_step=_GIVE)
     needed = ("range_m", "azimuth_rad", "elevation_rad")[: motion.dims]

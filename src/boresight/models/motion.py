@@ -5,8 +5,8 @@ motion says otherwise. `move(state, dt)` takes and gives (n,); `noise(dt)` is th
 of what `move` leaves out. Both run on floats and on symbols.
 """
 
-from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from dataclasses import dataclass, fields
+from typing import Any, Literal, Protocol, get_args, get_origin
 
 import numpy as np
 
@@ -39,9 +39,22 @@ def _names(dims: int, *kinds: str) -> tuple[str, ...]:
     return tuple(f"{kind.format(axis)}" for kind in kinds for axis in "xyz"[:dims])
 
 
-def _check_dims(dims: int) -> None:
-    if dims not in (2, 3):
-        raise UsageError(f"dims={dims!r} is neither 2 nor 3")
+def _check(motion: Any) -> None:
+    """Standard deviations become floats or arrays and are checked, and so are the switches."""
+    for field in fields(motion):
+        value = getattr(motion, field.name)
+        if field.type is float:
+            number = np.asarray(value, dtype=float)
+            if not np.all(number >= 0):
+                raise UsageError(f"{field.name}={value!r} is not a standard deviation")
+            object.__setattr__(motion, field.name, number if number.ndim else float(number))
+        elif get_origin(field.type) is Literal and value not in get_args(field.type):
+            raise UsageError(
+                f"{field.name}={value!r} is unknown",
+                next_step=f"use one of {', '.join(get_args(field.type))}",
+            )
+    if motion.dims not in (2, 3):
+        raise UsageError(f"dims={motion.dims!r} is neither 2 nor 3")
 
 
 def _outer(block: list[list[Any]], dims: int) -> Array:
@@ -80,7 +93,7 @@ class ConstantVelocity:
     discretisation: Literal["discrete", "continuous", "printed"] = "discrete"
 
     def __post_init__(self) -> None:
-        _check_dims(self.dims)
+        _check(self)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -119,7 +132,7 @@ class ConstantAcceleration:
     discretisation: Literal["discrete", "continuous"] = "continuous"
 
     def __post_init__(self) -> None:
-        _check_dims(self.dims)
+        _check(self)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -156,6 +169,9 @@ class CoordinatedTurn:
 
     accel_mps2: float
     turn_accel_degps2: float
+
+    def __post_init__(self) -> None:
+        _check(self)
 
     @property
     def dims(self) -> int:
@@ -220,7 +236,7 @@ class Static:
     dims: int = 3
 
     def __post_init__(self) -> None:
-        _check_dims(self.dims)
+        _check(self)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -249,6 +265,9 @@ class WithHeightOffset:
 
     inner: ConstantVelocity | ConstantAcceleration
     drift_m_per_sqrt_s: float
+
+    def __post_init__(self) -> None:
+        _check(self)
 
     @property
     def dims(self) -> int:
@@ -288,6 +307,9 @@ class SphericalUnitRate:
 
     position_noise: float
     velocity_noise: float
+
+    def __post_init__(self) -> None:
+        _check(self)
 
     @property
     def dims(self) -> int:
