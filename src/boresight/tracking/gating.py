@@ -21,13 +21,18 @@ class ManoeuvreGate:
     and other gross errors, so it must not turn away an aircraft that turns hard.
 
     Attributes:
-        spread_m: standard deviation of the displacement by an unmodelled manoeuvre since the last
-            plot, each axis, m; usually per lane and step, half the acceleration times dt².
+        half_dt2: dt²/2 since the last plot, s²; per lane and step.
+        accel_mps2: standard deviation of the acceleration of a target at rest, m/s².
+        turn_radps: what each m/s of speed adds to that: fast targets can turn harder.
         limit: largest squared distance that is admitted.
+        dims: number of position coordinates.
     """
 
-    spread_m: Any
+    half_dt2: Any
+    accel_mps2: float
+    turn_radps: float
     limit: float
+    dims: int = 3
 
     def admit(
         self, prior: Gaussian, z: Array, components: Sequence[Component]
@@ -35,13 +40,15 @@ class ManoeuvreGate:
         """The plot, NaN if it is outside, and 1 if it was inside (or empty), else 0.
 
         Args:
-            prior: predicted mean (n,), cov (n, n); positions are its first three states.
+            prior: predicted mean (n,), cov (n, n); positions, then velocities first.
             z: plot (k,).
             components: what the plot measures.
         """
         nu, H, noise, _ = linearise(components, z, prior.mean)
-        position = H[:, :3] if len(prior.mean) >= 6 else H[:, :2]
-        widened = H @ prior.cov @ H.T + self.spread_m * self.spread_m * (position @ position.T)
+        position, velocity = H[:, : self.dims], prior.mean[self.dims : 2 * self.dims]
+        speed = np.sqrt(velocity @ velocity + 1e-6)
+        spread = self.half_dt2 * (self.accel_mps2 + self.turn_radps * speed)
+        widened = H @ prior.cov @ H.T + spread * spread * (position @ position.T)
         L, inverse = cholesky(mirror(widened + np.diag(noise)))
         white = lower_solve(L, inverse, nu)
         inside = select(white @ white <= self.limit, 1.0, 0.0)
