@@ -1,0 +1,149 @@
+"""Scenarios: what a target does, what sees it, and where a filter may begin.
+
+The papers' scenarios are built from `papers/<key>.toml`, where their numbers stand, and nowhere
+else. All are in SI units but for `aditya`, whose lengths are km (erratum A7): a sensor of that
+scenario takes its range in km too, whatever its argument is called.
+"""
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
+
+import numpy as np
+
+from boresight.errors import UsageError
+from boresight.maths import Gaussian
+from boresight.models.motion import ConstantVelocity, Motion, SphericalUnitRate
+from boresight.models.sensors import Radar, Sensor
+
+Array = Any
+Begin = Literal["random draw", "given", "one plot", "two plots"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scenario:
+    """What a target does, what sees it, and where a filter may begin.
+
+    Attributes:
+        name: what `simulate` is called with; also the cell of its random numbers.
+        motion: how the target moves; its noise moves the truth too.
+        sensor: what sees it, unless another is given.
+        initial: (n,) where every truth starts, exactly, at time 0.
+        prior_cov: (n, n) how uncertain a filter is of that.
+        begin: `random draw`: each run's filter starts at its own draw from N(initial, prior_cov);
+            `given`: at `initial`; `one plot`, `two plots`: from the first plots, which are then
+            not used again.
+        dt_s: s between scans.
+        scans: number of scans.
+        first_at_start: whether the first scan is at time 0, or one step later.
+        length_unit: unit of positions and ranges.
+        source: paper and section.
+    """
+
+    name: str
+    motion: Motion
+    sensor: Sensor
+    initial: Array
+    prior_cov: Array
+    begin: Begin = "random draw"
+    dt_s: float = 1.0
+    scans: int
+    first_at_start: bool = True
+    length_unit: str = "m"
+    source: str = ""
+
+    @property
+    def prior(self) -> Gaussian:
+        """What a filter knows before the first plot."""
+        return Gaussian(self.initial, self.prior_cov)
+
+    @property
+    def dt(self) -> Array:
+        """(1, scans): s before each scan."""
+        steps = np.full((1, self.scans), self.dt_s)
+        steps[0, 0] = 0.0 if self.first_at_start else self.dt_s
+        return steps
+
+    @property
+    def time_s(self) -> Array:
+        """(scans,): when each scan is."""
+        return np.cumsum(self.dt[0])
+
+
+def paper(key: str) -> dict[str, Any]:
+    """What `papers/<key>.toml` holds: the numbers a paper prints, and what is assumed."""
+    text = (resources.files("boresight.experiments.papers") / f"{key}.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+def _kashyap(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
+    common, dims = table["common"], len(own["initial"]) // 2
+    spread = [common["assumed_position_sd_m"]] * dims + [common["assumed_velocity_sd_mps"]] * dims
+    return Scenario(
+        name=name,
+        motion=ConstantVelocity(accel_mps2=common["accel_variance_m2ps4"] ** 0.5, dims=dims),
+        sensor=Radar(**own["sigma"]),
+        initial=np.array(own["initial"]),
+        prior_cov=np.diag(np.square(spread)),
+        begin=common["begin"],
+        dt_s=common["dt_s"],
+        scans=common["scans"],
+        source=own["where"],
+    )
+
+
+def _aditya(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
+    printed, assumed = table["table2"], table["assumed"]
+    noise = float(printed["Q"] ** 0.5)
+    names = ("sigma_range_km", "sigma_azimuth_rad", "sigma_elevation_rad")
+    sigmas = [printed[n] if own["noise"] == "sigma" else printed["R"] ** 0.5 for n in names]
+    azimuth_deg, elevation_deg = np.degrees(sigmas[1:])
+    return Scenario(
+        name=name,
+        motion=SphericalUnitRate(position_noise=noise, velocity_noise=noise),
+        sensor=Radar(range_m=sigmas[0], azimuth_deg=azimuth_deg, elevation_deg=elevation_deg),
+        initial=np.array(printed["initial"]),
+        prior_cov=printed["P0"] * np.eye(len(printed["initial"])),
+        begin=assumed["begin"],
+        dt_s=printed["dt_s"],
+        scans=assumed["scans"],
+        first_at_start=False,
+        length_unit="km",
+        source=own["where"],
+    )
+
+
+_BUILDERS: dict[str, Callable[[str, dict[str, Any], dict[str, Any]], Scenario]] = {
+    "kashyap": _kashyap,
+    "aditya": _aditya,
+}
+
+
+@cache
+def _scenarios() -> dict[str, Scenario]:
+    return {
+        name: build(name, own, table)
+        for build, table in ((build, paper(key)) for key, build in _BUILDERS.items())
+        for name, own in table["scenarios"].items()
+    }
+
+
+def scenario_names() -> tuple[str, ...]:
+    """Names of the papers' scenarios."""
+    return tuple(_scenarios())
+
+
+def lookup(name: str) -> Scenario:
+    """The scenario of that name; UsageError with the nearest valid name if there is none."""
+    known = _scenarios()
+    if name in known:
+        return known[name]
+    near = get_close_matches(name, known, n=1)
+    raise UsageError(
+        f"there is no scenario {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
+        next_step=f"use one of {', '.join(known)}",
+    )

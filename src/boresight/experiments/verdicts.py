@@ -1,0 +1,99 @@
+"""Verdicts: what may be said of a number or a claim that a paper prints.
+
+    reproduces          a number: inside the band of single runs, and within 5 % of our median;
+                        a claim: true in at least 95 % of our runs
+    in band             a number: inside the band, but the band is too wide to say more;
+                        a claim: true in some runs and false in others
+    does not reproduce  a number: outside the band; a claim: true in at most 5 % of our runs
+    cannot be checked   what it depends on is not printed
+
+A paper prints one run, or does not say how many; so the band is that of single runs, 5 to 95 %.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+Array = Any
+Verdict = Literal["reproduces", "in band", "does not reproduce", "cannot be checked"]
+_BAND = (0.05, 0.95)
+_CLOSE = 0.05
+_RANK: tuple[Verdict, ...] = ("does not reproduce", "cannot be checked", "in band", "reproduces")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """A table, figure or sentence of a paper, beside ours.
+
+    Attributes:
+        id: as in the list of all claims, `AD-T3`.
+        where: in the paper.
+        published: a number, a sentence, or numbers by name.
+        ours: the same of our runs.
+        band: in which single runs of ours lie, (low, high); by name; or None.
+        verdict: see the module.
+        assumption: what we had to assume, and how the verdict was found.
+        parts: claims that this one is made of.
+    """
+
+    id: str
+    where: str
+    published: Any
+    ours: Any
+    band: Any = None
+    verdict: Verdict
+    assumption: str = ""
+    parts: tuple["Claim", ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; `parts` only where there are some."""
+        row = {name: getattr(self, name) for name in _FIELDS}
+        return row | ({"parts": [part.as_dict() for part in self.parts]} if self.parts else {})
+
+
+_FIELDS = ("id", "where", "published", "ours", "band", "verdict", "assumption")
+
+
+def band_of(values: Array) -> tuple[float, float]:
+    """5 % and 95 % quantiles of single runs (runs,)."""
+    low, high = np.quantile(values, _BAND)
+    return float(low), float(high)
+
+
+def of_number(published: float, values: Array, *, fitted: bool = False) -> Verdict:
+    """Verdict on a printed number.
+
+    Args:
+        published: the number.
+        values: single runs of ours (runs,).
+        fitted: whether something not printed was chosen so that numbers fit: then a number that
+            does is in the band, and no more is said of it.
+    """
+    low, high = band_of(values)
+    if not low <= published <= high:
+        return "does not reproduce"
+    near = abs(float(np.median(values)) / published - 1.0) <= _CLOSE
+    return "reproduces" if near and not fitted else "in band"
+
+
+def of_share(share: float) -> Verdict:
+    """Verdict on a claim about one run, from the share of our runs in which it is true."""
+    low, high = _BAND
+    if share <= low:
+        return "does not reproduce"
+    return "reproduces" if share >= high else "in band"
+
+
+def worst(verdicts: list[Verdict]) -> Verdict:
+    """The least favourable verdict: a table reproduces when all of it does."""
+    return min(verdicts, key=_RANK.index)
+
+
+def share_interval(true: int, runs: int, error: float = 0.05) -> tuple[float, float]:
+    """Exact (Clopper-Pearson) confidence interval of a share."""
+    from scipy.special import betaincinv
+
+    low = float(betaincinv(true, runs - true + 1, error / 2)) if true else 0.0
+    high = float(betaincinv(true + 1, runs - true, 1 - error / 2)) if true < runs else 1.0
+    return low, high
