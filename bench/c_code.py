@@ -159,10 +159,11 @@ def write_c(program: Program, form: str) -> str:
         program: lowered program (`elementary.lower`).
         form: "lanes" or "vectors".
     """
-    arguments = [f"double* __restrict in{i}" for i in range(len(program.inputs))]
-    arguments += [f"double* __restrict out{i}" for i in range(len(program.outputs))]
-    lines = [_HEAD, 'extern "C" void kernel(i64 from, i64 to, i64 steps, i64 lanes,']
-    lines += [f"  double* __restrict old, double* __restrict fresh, {', '.join(arguments)}) {{"]
+    arrays = ["old", "fresh", *(f"in{i}" for i in range(len(program.inputs)))]
+    arrays += [f"out{i}" for i in range(len(program.outputs))]
+    parameters = ["i64 from", "i64 to", "i64 steps", *(f"double* __restrict {a}" for a in arrays)]
+    words = ["f[0]", "f[1]", "f[2]", *(f"(double*)f[{4 + i}]" for i in range(len(arrays)))]
+    lines = [_HEAD, f"static inline void run({', '.join(parameters)}) {{"]
     for rate, moved in ((Rate.FIXED, ""), (Rate.STEP, "t * {size} + ")):
         if rate == Rate.STEP:
             lines += [f"for (i64 b = from; b < to; ++b) {{ v8 s_[{program.state_size}];"]
@@ -177,10 +178,11 @@ def write_c(program: Program, form: str) -> str:
     loop = "#pragma GCC ivdep\nfor (int l = 0; l < 8; ++l) {" if form == "lanes" else "{"
     lines += [loop, *_body(program, form), "}}"]
     lines += [f"memcpy(fresh + b * {program.state_size * 8}, s, sizeof s_);", "}}"]
+    lines += [f'extern "C" void kernel(i64* f) {{ run({", ".join(words)}); }}']
     return "\n".join(lines)
 
 
-def compile_c(source: str, flags: tuple[str, ...], arguments: int) -> Any:
+def compile_c(source: str, flags: tuple[str, ...]) -> Any:
     """Gcc's function, with the calling convention of ours."""
     folder = Path(tempfile.gettempdir()) / "boresight-bench"
     folder.mkdir(exist_ok=True)
@@ -191,7 +193,7 @@ def compile_c(source: str, flags: tuple[str, ...], arguments: int) -> Any:
         command = ["g++", "-w", *COMMON, *flags, "-shared", "-fPIC", str(code), "-o", str(library)]
         subprocess.run(command, check=True, capture_output=True)
     function = ctypes.CDLL(str(library)).kernel
-    function.argtypes = [ctypes.c_int64] * 4 + [ctypes.c_void_p] * arguments
+    function.argtypes = [ctypes.c_void_p]
     function.restype = None
     return function
 
@@ -201,5 +203,4 @@ def gcc_kernel(kernel: Kernel, form: str, flags: tuple[str, ...]) -> Kernel:
     if kernel.code is None or kernel.rows or kernel.code.shape.width != BLOCK:
         raise ValueError("the rival is written for compiled kernels in blocks, 8 lanes wide")
     source = write_c(lower(kernel.program, rounding=True), form)
-    count = 2 + len(kernel.program.inputs) + len(kernel.program.outputs)
-    return replace(kernel, code=replace(kernel.code, call=compile_c(source, flags, count)))
+    return replace(kernel, code=replace(kernel.code, call=compile_c(source, flags)))

@@ -9,7 +9,8 @@ same bits live as in a batch of thousands.
 """
 
 import ctypes
-from ctypes import addressof, c_double
+import struct
+from ctypes import addressof
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ class StreamState:
 
     def __init__(self, stream: "Stream", buffer: Any) -> None:
         self._stream = stream
-        self.buffer = buffer  # the kernel's own memory: blocked state, then the summary
+        self.buffer = buffer  # the kernel's own memory: blocked state, summary, dt and the plot
 
     @property
     def mean(self) -> Array:
@@ -92,18 +93,18 @@ class Stream:
         """Fix addresses and sizes once: looking them up costs more than the filter does."""
         program, code = self._kernel.program, self._kernel.code
         self._state_numbers = -(-self._lanes // BLOCK) * program.state_size * BLOCK
-        self._summary = 8 * self._state_numbers  # byte offset
-        self._buffer_type: Any = ctypes.c_double * (
-            self._state_numbers + len(SUMMARY) * self._lanes
-        )
-        self._plot_type: Any = ctypes.c_double * (self._components * self._lanes)
+        self._clock = self._state_numbers + len(SUMMARY) * self._lanes
+        count = self._components * self._lanes
+        self._buffer_type: Any = ctypes.c_double * (self._clock + 1 + count)
+        self._pack = struct.Struct(f"{1 + count}d").pack_into
         names = [slot.name for slot in program.inputs]
         if names[:2] != ["z", "dt"]:
             raise AssertionError("the recursion declares the plot and dt first")
         self._keep = [np.ascontiguousarray(self._values[n], dtype=float) for n in names[2:]]
         self._numbers = tuple(array.ctypes.data for array in self._keep)
-        self._call = code.call if code else None
-        self._chunks = code.chunks(self._lanes) if code else 0
+        if code:
+            self._call, self._frame = code.call, code.frame.pack
+            self._head = (0, code.chunks(self._lanes), 1, self._lanes)
 
     def start(self, plot: Array | Gaussian, *, speed_mps: float = SPEED_MPS) -> StreamState:
         """Begin from a plot (k,) or (targets, k), or from a Gaussian."""
@@ -130,50 +131,48 @@ class Stream:
                 f"dt={dt!r} s: time does not go backwards",
                 next_step="keep the states of earlier plots and step again from the one before",
             )
-        if self.targets is None:
-            if len(plot) != self._components:
-                raise self._wrong(plot)
-            z: Any = self._plot_type(*plot)
-            address = addressof(z)
+        if type(state.buffer) is not self._buffer_type:
+            raise UsageError("the state is that of a stream with other sizes")
+        buffer = self._buffer_type()
+        self._accept(buffer, plot, dt)
+        if self._kernel.code is None:
+            self._in_numpy(state.buffer, buffer)
         else:
-            z = np.ascontiguousarray(plot, dtype=float)
-            if z.shape != (self._lanes, self._components):
-                raise self._wrong(plot)
-            address = z.ctypes.data
-        if self._call is None:
-            return self._in_numpy(state, z, dt)
-        buffer, clock = self._buffer_type(), c_double(dt)
-        new = addressof(buffer)
-        self._call(
-            0,
-            self._chunks,
-            1,
-            self._lanes,
-            addressof(state.buffer),
-            new,
-            address,
-            addressof(clock),
-            *self._numbers,
-            new + self._summary,
-        )
+            self._in_kernel(addressof(state.buffer), addressof(buffer))
         return StreamState(self, buffer)
+
+    def _accept(self, buffer: Any, plot: Array, dt: float) -> None:
+        """Write dt and the plot behind the new state."""
+        if self.targets is None:
+            numbers = plot.tolist() if type(plot) is np.ndarray else plot  # Python floats are quick
+            try:
+                self._pack(buffer, 8 * self._clock, dt, *numbers)
+            except (struct.error, TypeError):
+                raise self._wrong(plot) from None
+        elif np.shape(plot) == (self._lanes, self._components):
+            numbers = np.frombuffer(buffer)[self._clock :]
+            numbers[0], numbers[1:] = dt, np.ravel(plot)
+        else:
+            raise self._wrong(plot)
+
+    def _in_kernel(self, old: int, new: int) -> None:
+        summary, clock = new + 8 * self._state_numbers, new + 8 * self._clock
+        self._call(self._frame(*self._head, old, new, clock + 8, clock, *self._numbers, summary))
+
+    def _in_numpy(self, old: Any, new: Any) -> None:
+        numbers = np.frombuffer(new)
+        z = numbers[self._clock + 1 :].reshape(self._lanes, 1, self._components)
+        values = self._values | {"z": z, "dt": numbers[self._clock]}
+        final, outputs = self._kernel.run(self._states(old), values, 1)
+        numbers[: self._state_numbers] = final.data.ravel()
+        numbers[self._state_numbers : self._clock] = outputs["summary"].ravel()
 
     def _wrong(self, plot: Any) -> UsageError:
         shape = (self._components,) if self.targets is None else (self._lanes, self._components)
         return UsageError(
-            f"a plot has shape {np.shape(plot)}; {shape} is needed",
+            f"a plot has shape {np.shape(plot)}; {shape} numbers are needed",
             why=f"the sensor measures {', '.join(self.recursion.sensor.names)}",
         )
-
-    def _in_numpy(self, state: StreamState, z: Any, dt: float) -> StreamState:
-        rows = np.array(z, dtype=float).reshape(self._lanes, 1, self._components)
-        values = self._values | {"z": rows, "dt": dt}
-        final, outputs = self._kernel.run(self._states(state.buffer), values, 1)
-        buffer = self._buffer_type()
-        numbers = np.frombuffer(buffer)
-        numbers[: self._state_numbers] = final.data.ravel()
-        numbers[self._state_numbers :] = outputs["summary"].ravel()
-        return StreamState(self, buffer)
 
     def _states(self, buffer: Any) -> States:
         program = self._kernel.program
@@ -187,6 +186,6 @@ class Stream:
 
     def output(self, buffer: Any, name: str) -> Any:
         """An output of the last step: a number, or (targets,)."""
-        rows = np.frombuffer(buffer)[self._state_numbers :].reshape(self._lanes, len(SUMMARY))
-        column = rows[:, SUMMARY.index(name)]
+        rows = np.frombuffer(buffer)[self._state_numbers : self._clock]
+        column = rows.reshape(self._lanes, len(SUMMARY))[:, SUMMARY.index(name)]
         return float(column[0]) if self.targets is None else column.copy()

@@ -116,16 +116,17 @@ class Kernel:
         arrays = (states.data, new, *packed, *outputs)
         addresses = [array.ctypes.data for array in arrays]
         chunks = self.code.chunks(states.lanes)
-        cuts = np.linspace(0, chunks, min(threads, chunks) + 1).astype(int)
-        call = self.code.call
+        parts = min(threads, chunks)
+        cuts = [i * chunks // parts for i in range(parts + 1)]
+        call, pack = self.code.call, self.code.frame.pack
 
         def part(first: int, last: int) -> None:
-            call(first, last, steps, states.lanes, *addresses)
+            call(pack(first, last, steps, states.lanes, *addresses))
 
-        if len(cuts) == 2:
+        if parts == 1:
             part(0, chunks)
         else:
-            list(_pool().map(part, cuts[:-1].tolist(), cuts[1:].tolist()))
+            list(_pool().map(part, cuts[:-1], cuts[1:]))
         return States(states.slots, new, states.lanes), self._unpack(outputs)
 
     def _check(self, states: States, steps: int, threads: int) -> None:

@@ -1,6 +1,7 @@
 """A program as LLVM's intermediate representation: one function that runs blocks of lanes.
 
-The function has this shape, with W lanes in one instruction and blocks of 8 lanes in memory:
+The function takes one address, of the words that describe a call, and has this shape, with W lanes
+in one instruction and blocks of 8 lanes in memory:
 
     fixed work, as scalars
     for each chunk of W lanes:
@@ -246,6 +247,15 @@ def _chunk_places(w: _Writer) -> None:
         w.line(f"  %lane = {call}({w.vector.integer} {lane}, {w.vector.integer} {last})")
 
 
+def _unpack_frame(w: _Writer, arrays: list[str]) -> None:
+    """The words of a call: first chunk and the one after the last, steps, lanes, addresses."""
+    kinds = dict.fromkeys(("%from", "%to", "%steps", "%lanes"), "i64")
+    kinds |= dict.fromkeys(("%old", "%new", *arrays), "ptr")
+    for i, (word, kind) in enumerate(kinds.items()):
+        pointer = w.emit(f"getelementptr i64, ptr %frame, i64 {i}")
+        w.line(f"  {word} = load {kind}, ptr {pointer}, align 8")
+
+
 def write_ir(program: Program, shape: Shape, name: str, attributes: str) -> str:
     """LLVM text of the kernel.
 
@@ -258,9 +268,8 @@ def write_ir(program: Program, shape: Shape, name: str, attributes: str) -> str:
     w = _Writer(program, shape)
     arguments = [f"%in{i}" for i in range(len(program.inputs))]
     results = [f"%out{i}" for i in range(len(program.outputs))]
-    parameters = "i64 %from, i64 %to, i64 %steps, i64 %lanes, ptr %old, ptr %new"
-    parameters += "".join(f", ptr {a}" for a in (*arguments, *results))
-    w.line(f"define void @{name}({parameters}) {attributes} {{\nentry:")
+    w.line(f"define void @{name}(ptr %frame) {attributes} {{\nentry:")
+    _unpack_frame(w, [*arguments, *results])
     slots = list(zip(program.inputs, arguments, strict=True))
     for slot, argument in slots:
         if slot.rate == Rate.FIXED:

@@ -6,6 +6,7 @@ runs here in NumPy over lanes, as the oracle of the compiled form and its fallba
 """
 
 import hashlib
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntFlag
@@ -44,7 +45,7 @@ class Leaf:
         """Numbers kept for one target."""
         if self.symmetric:
             return self.shape[0] * (self.shape[0] + 1) // 2
-        return int(np.prod(self.shape))
+        return math.prod(self.shape)
 
     def build(self, numbers: Sequence[Any]) -> Any:
         """The array (or scalar) of `size` numbers, floats or symbols, for one target."""

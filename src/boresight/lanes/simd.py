@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import hashlib
 import os
+import struct
 import tempfile
 import threading
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from boresight.lanes.elementary import lower
 from boresight.lanes.ir import BLOCK, Shape, write_ir
 from boresight.lanes.program import Program
 
-FORMAT = 1  # of the calling convention; part of every cached object's name
+FORMAT = 2  # of the calling convention; part of every cached object's name
 _LOCK = threading.RLock()  # LLVM's contexts are not made for several threads
 _LOADED: dict[str, Any] = {}  # code by name: LLVM never frees a name, nor loads it twice
 
@@ -159,13 +160,22 @@ def _jit() -> Any:
 
 @dataclass(frozen=True)
 class Code:
-    """Machine code of one program; `call` takes chunk numbers, steps, lanes and addresses."""
+    """Machine code of one program; `call` takes one packed `frame`: arguments are what is slow."""
 
     program: Program
     shape: Shape
     goal: Target
     call: Any
     resources: Any  # owns the code: must outlive `call`
+
+    @property
+    def frame(self) -> struct.Struct:
+        """What describes a call.
+
+        First chunk and the one after the last, steps, lanes; addresses of the old and the new
+        state, the inputs and the outputs.
+        """
+        return struct.Struct(f"{6 + len(self.program.inputs) + len(self.program.outputs)}q")
 
     def chunks(self, lanes: int) -> int:
         """Number of chunks that hold `lanes`."""
@@ -203,6 +213,5 @@ def _compile(program: Program, shape: Shape, goal: Target) -> Code:
         data = _object(text.replace("@kernel(", f"@{name}(", 1), name, goal)
         library = llvm.JITLibraryBuilder().add_object_img(data).export_symbol(name)
         resources = _LOADED[name] = library.link(_jit(), name)
-    count = 2 + len(program.inputs) + len(program.outputs)
-    kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4, *[ctypes.c_void_p] * count)
+    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
     return Code(program, shape, goal, kind(resources[name]), resources)
