@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from boresight.experiments import demo
+from boresight.experiments import against_truth, demo
 from boresight.experiments.truth import Truth
 from boresight.maths import frames
 from boresight.maths.angles import wrap
@@ -82,7 +82,7 @@ def everyone(truth, step_s=5.0):
 
 def test_the_truth_as_seen_is_what_a_noiseless_radar_reports(truth):
     flight, time = everyone(truth)
-    seen = demo.as_seen(truth, flight, time, FACTS)
+    seen = against_truth.as_seen(truth, flight, time, FACTS)
     then = truth.at(flight, time - RADAR["time_bias_s"])
     polar, found = frames.polar_from_enu(then.position), frames.polar_from_enu(seen.position)
     delay = excess(polar.range_m, frames.ellipsoid_height(*then.position.T, SITE))
@@ -91,8 +91,8 @@ def test_the_truth_as_seen_is_what_a_noiseless_radar_reports(truth):
     np.testing.assert_allclose(found.range_m[near], expected[near], atol=0.1)
     across = wrap(found.azimuth - polar.azimuth - np.radians(RADAR["azimuth_bias_deg"]))
     np.testing.assert_allclose(across * polar.range_m, 0, atol=0.1)
-    later = demo.as_seen(truth, flight, time + 0.1, FACTS)
-    earlier = demo.as_seen(truth, flight, time - 0.1, FACTS)
+    later = against_truth.as_seen(truth, flight, time + 0.1, FACTS)
+    earlier = against_truth.as_seen(truth, flight, time - 0.1, FACTS)
     slope = (later.position - earlier.position) / 0.2
     np.testing.assert_allclose(seen.velocity, slope, atol=0.05)  # knots are whole millimetres
 
@@ -113,10 +113,11 @@ def tracks_with_errors(truth, scale):
         who["address"].replace("", None), who["mode_a"], track=flight, time_s=time,
         status=pl.lit("updated"), **{name: pl.lit(value) for name, value in upper.items()},
     )  # fmt: skip
+    residuals = table.select("track", "time_s", straight=pl.lit(True))
     nothing = pl.DataFrame()
     nis = {"all": {"mean": 1.0, "median": 0.7, "dof": 2.0, "scans": len(time)}}
     result = TrackingResult(
-        tracks=table, residuals=nothing, targets=nothing, skipped=nothing, plots=len(time),
+        tracks=table, residuals=residuals, targets=nothing, skipped=nothing, plots=len(time),
         used=len(time), rejected=0, filter="drawn", nis=nis, settings={},
     )  # fmt: skip
     return result, cov
@@ -125,11 +126,14 @@ def tracks_with_errors(truth, scale):
 @pytest.mark.parametrize("scale", [1.0, 1.5])
 def test_errors_drawn_from_the_stated_covariance_are_called_consistent(truth, scale):
     result, cov = tracks_with_errors(truth, scale)
-    rows = demo.settled_rows(result, FACTS)
+    rows = against_truth.settled_rows(
+        result, FACTS, against_truth.false_tracks(result, truth, FACTS)
+    )
     assert rows["flight"].n_unique() == len(FACTS["flights"])
     assert rows["flight"].to_list() == rows["track"].to_list()
     motion = truth.at(rows["flight"].to_numpy(), rows["time_s"].to_numpy())
-    found = demo.compare(result, motion, rows, ns=100.0)
+    figures = {"filter": "drawn", "updates": 1, "nis_per_dof": 1.0, "ns_per_update": 1.0}
+    found = against_truth.compare(motion, rows, **figures)
     share = 4 / np.sqrt(2 * len(rows))  # four standard errors
     assert found.position_rmse_m == pytest.approx(scale * np.sqrt(cov[0, 0] + cov[1, 1]), rel=share)
     expected = scale * np.sqrt(cov[3, 3] + cov[4, 4])
@@ -139,3 +143,59 @@ def test_errors_drawn_from_the_stated_covariance_are_called_consistent(truth, sc
     assert (low < found.anees < high) == (scale == 1.0)
     # chi-square over 204 degrees of freedom, tables: 166.3 and 245.5 (Wilson and Hilferty)
     assert (low, high) == pytest.approx((0.815, 1.203), abs=0.003)
+
+
+@pytest.fixture(scope="module")
+def result():
+    stages = []
+    found = demo.run_demo(stages.append)
+    assert len(stages) == 1 + len(demo.FILTERS)
+    return found
+
+
+def test_every_plot_is_accounted_for(result):
+    counts = FACTS["counts"]
+    for tracks in result.results.values():
+        skipped = dict(tracks.skipped.select("reason", "count").iter_rows())
+        assert tracks.plots == counts["cat048"]
+        assert tracks.used + sum(skipped.values()) == tracks.plots
+        assert skipped["coasted"] == counts["coasted"]
+        assert skipped["no identity"] == counts["clutter"]
+        real = counts["aircraft"] + counts["monitor"]
+        assert 0.99 * real < tracks.used < real + counts["split"] + counts["reflection"]
+        flights = set(tracks.targets["address"].drop_nulls()) - {RADAR["monitor"]["address"]}
+        assert flights == {flight["address"] for flight in FACTS["flights"]} - {""}
+
+
+def test_filtering_beats_plots_and_the_planted_bias_is_what_remains(result):
+    """Each figure against one worked out from the planted errors and the flights' ranges alone."""
+    error = result.plot_error
+    used = result.results["ekf"].residuals.filter("used")
+    across = used["range_m"].to_numpy() * np.radians(RADAR["azimuth_noise_deg"])
+    noise = np.sqrt(RADAR["range_noise_m"] ** 2 + np.mean(across**2))
+    assert error.unbiased == pytest.approx(noise, rel=0.04)  # elevations shorten it a little
+    assert 0.5 < error.share_of_bias < 0.9
+    for true, seen, straight in zip(
+        result.comparisons, result.as_seen, result.straight, strict=True
+    ):
+        assert straight.position_rmse_m < 0.9 * error.unbiased
+        assert seen.position_rmse_m < true.position_rmse_m
+        assert straight.velocity_rmse_mps < 0.6 * seen.velocity_rmse_mps
+        assert 0.8 < straight.nis_per_dof < 1.25
+        assert seen.anees > 2  # turns: a constant-velocity filter cannot be consistent
+        bias = np.sqrt(true.position_rmse_m**2 - seen.position_rmse_m**2)
+        expected = error.as_measured * np.sqrt(error.share_of_bias)
+        assert bias == pytest.approx(expected, rel=0.1)
+
+
+def test_only_the_planted_reflection_is_a_false_track(result):
+    targets = result.results["mekf"].targets
+    false = targets.filter(pl.col("track").is_in(result.false_tracks))
+    assert false["plots"].sum() <= FACTS["counts"]["reflection"]
+    assert false["address"].n_unique() <= 1
+
+
+def test_the_remarks_own_up_to_the_bias(result):
+    text = " ".join(result.remarks)
+    assert "+85 m in range, +0.12 degrees in azimuth and +0.08 s in time, are not removed" in text
+    assert "cannot be consistent in turns" in text

@@ -6,45 +6,36 @@ errors of range, azimuth and time, would see it without noise. The difference is
 is worth.
 """
 
+import io
 import json
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.resources import files
-from typing import TYPE_CHECKING, Any, NamedTuple
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from boresight.experiments.truth import Motion, Truth
-from boresight.maths import frames
-from boresight.maths.angles import wrap
-from boresight.maths.gaussian import Array
-from boresight.models.atmosphere import ExponentialAtmosphere
+from boresight.catalogue import lookup
+from boresight.experiments.against_truth import (
+    ELSEWHERE_M,
+    Held,
+    PlotError,
+    false_tracks,
+    hold,
+    plot_error,
+)
+from boresight.experiments.truth import Truth
+from boresight.formats.recording import Recording, read_recording
+from boresight.maths.frames import Site
+from boresight.tracking.noise import Noise
 from boresight.tracking.result import Comparison, TrackingResult
+from boresight.tracking.tracker import track
 
 if TYPE_CHECKING:
     import polars as pl
 
 FILTERS = ("ekf", "mekf")
-_SETTLED = 8  # updates of a track before it is judged, as after any start
-_PLANAR = (0, 1, 3, 4)  # east, north and their rates, of the six states
-
-
-class PlotError(NamedTuple):
-    """Horizontal error of plots before any filter, root mean square in metres.
-
-    Attributes:
-        as_measured: against the truth at the time the radar states.
-        unbiased: what is left once the planted errors and the air's delay are taken out.
-        plots: how many.
-    """
-
-    as_measured: float
-    unbiased: float
-    plots: int
-
-    @property
-    def share_of_bias(self) -> float:
-        """Share of the mean squared error that is bias."""
-        return 1 - (self.unbiased / self.as_measured) ** 2
+Progress = Callable[[str], None]
+_FOLDER = files("boresight") / "demo"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,140 +44,105 @@ class DemoResult:
 
     Attributes:
         facts: what was planted, and counts, as shipped.
+        recording: what was read out of the bytes.
         results: filter's name to its tracks.
         comparisons: each filter against the truth.
         as_seen: each filter against the truth as the biased radar would see it without noise.
+        straight: the same in straight flight only (downlinked roll below 2 degrees), the flight
+            that a constant-velocity filter describes.
         plot_error: the same for plots before filtering.
+        false_tracks: numbers of tracks with a flight's identity and not where it was, such as a
+            reflection's; the figures above leave them out.
         remarks: sentences for the reader.
     """
 
     facts: dict[str, Any]
+    recording: Recording
     results: dict[str, TrackingResult]
     comparisons: list[Comparison]
     as_seen: list[Comparison]
+    straight: list[Comparison]
     plot_error: PlotError
+    false_tracks: list[int]
     remarks: list[str]
+
+
+def run_demo(progress: Progress | None = None) -> DemoResult:
+    """Decode the shipped recording, track it with each filter, and hold that against the truth.
+
+    Args:
+        progress: called with a few words before each stage.
+    """
+    say = progress or (lambda _: None)
+    say("decoding the recording")
+    facts, truth = shipped()
+    with as_file(_FOLDER / "recording.ast") as path:
+        recording = read_recording(path)
+    site = Site(**facts["site"])
+    results, held = {}, []
+    for name in FILTERS:
+        say(f"tracking with {name}")
+        results[name] = track(recording.plots, filter=lookup(name), site=site)
+        ns = _ns_per_update(recording.plots, results[name], site)
+        held.append(hold(results[name], truth, facts, ns))
+    false = false_tracks(results[name], truth, facts)
+    error = plot_error(results[name], truth, facts, false)
+    true, seen, straight = (list(one) for one in zip(*held, strict=True))
+    return DemoResult(
+        facts=facts,
+        recording=recording,
+        results=results,
+        comparisons=true,
+        as_seen=seen,
+        straight=straight,
+        plot_error=error,
+        false_tracks=false,
+        remarks=_remarks(facts, held, error, len(false)),
+    )
+
+
+def _ns_per_update(plots: "pl.DataFrame", result: TrackingResult, site: Site) -> float:
+    """Processor time of tracking once more with the noise known: plots in, tables out."""
+    noise, start = Noise(**result.settings["noise"]), time.process_time_ns()
+    track(plots, filter=lookup(result.filter), site=site, noise=noise)
+    return (time.process_time_ns() - start) / max(result.used, 1)
 
 
 def shipped() -> tuple[dict[str, Any], Truth]:
     """Return what was planted and the truth, as they come with the package."""
-    import io
-
     import polars as pl
 
-    folder = files("boresight") / "demo"
-    facts = json.loads((folder / "facts.json").read_text(encoding="utf-8"))
-    return facts, Truth(pl.read_parquet(io.BytesIO((folder / "truth.parquet").read_bytes())))
+    facts = json.loads((_FOLDER / "facts.json").read_text(encoding="utf-8"))
+    return facts, Truth(pl.read_parquet(io.BytesIO((_FOLDER / "truth.parquet").read_bytes())))
 
 
-def as_seen(truth: Truth, flight: Array, time_s: Array, facts: dict[str, Any]) -> Motion:
-    """Return flights (n,) as the radar would report them at times (n,) if it had no noise.
-
-    Its clock is fast, its azimuth turned, its range too long.
-    """
-    then = truth.at(flight, time_s - facts["radar"]["time_bias_s"])
-    step = 0.1 * then.velocity
-    ahead, behind = (_seen_place(then.position + sign * step, facts) for sign in (1, -1))
-    return Motion(_seen_place(then.position, facts), (ahead - behind) / 0.2)
-
-
-def _seen_place(place: Array, facts: dict[str, Any]) -> Array:
-    """Add the air's delay and the biases of range and azimuth to positions (n, 3)."""
-    radar, site = facts["radar"], frames.Site(**facts["site"])
-    air = ExponentialAtmosphere(
-        surface_refractivity=radar["atmosphere"]["surface_refractivity"],
-        scale_height_m=radar["atmosphere"]["scale_height_m"],
+def _remarks(facts: dict[str, Any], held: list[Held], error: PlotError, false: int) -> list[str]:
+    """Say what the figures mean."""
+    radar = facts["radar"]
+    biased = (
+        f"The radar's planted errors, {radar['range_bias_m']:+g} m in range, "
+        f"{radar['azimuth_bias_deg']:+g} degrees in azimuth and {radar['time_bias_s']:+g} s in "
+        "time, are not removed: no calibration has been made."
     )
-    polar, (east, north, up) = frames.polar_from_enu(place), place.T
-    height = frames.ellipsoid_height(east, north, up, site)
-    excess = air.excess_range(polar.range_m, height, site.height_m) + radar["range_bias_m"]
-    turn = np.radians(radar["azimuth_bias_deg"])
-    return frames.enu_from_polar(polar.range_m + excess, polar.azimuth + turn, polar.elevation)
-
-
-def compare(
-    result: TrackingResult, reference: Motion, rows: "pl.DataFrame", ns: float
-) -> Comparison:
-    """Hold track rows (n) against where their flights were, horizontally.
-
-    Errors of one track are alike from scan to scan, so in the band of the ANEES a track counts
-    once, however many its scans.
-    """
-    error, cov = _planar_error(reference, rows), _planar_cov(rows)
-    nees = np.einsum("ni,ni->n", error, np.linalg.solve(cov, error[..., None])[..., 0])
-    return Comparison(
-        filter=result.filter,
-        position_rmse_m=_rms(error[:, :2]),
-        velocity_rmse_mps=_rms(error[:, 2:]),
-        anees=float(np.mean(nees)) / len(_PLANAR),
-        anees_bounds=_band(len(_PLANAR) * rows["track"].n_unique()),
-        nis_per_dof=result.nis["all"]["mean"],
-        updates=result.used,
-        ns_per_update=ns,
+    plots = (
+        f"Before any filter the plots are {error.as_measured:.0f} m off horizontally (root mean "
+        f"square); {100 * error.share_of_bias:.0f} % of its square is bias, the noise alone "
+        f"{error.unbiased:.0f} m."
     )
+    left_out = (
+        f"Tracks left out of these figures, since they bear a flight's identity more than "
+        f"{ELSEWHERE_M / 1e3:g} km from it (reflections): {false}."
+    )
+    return [biased, plots, *map(_difference, held), *([left_out] if false else [])]
 
 
-def plot_error(result: TrackingResult, truth: Truth, facts: dict[str, Any]) -> PlotError:
-    """Return the horizontal error of the plots that tracks used, at the true elevation."""
-    import polars as pl
-
-    identity = result.targets.select("track", "address", "mode_a")
-    used = result.residuals.filter("used").select("track", "time_s", "range_m", "azimuth_deg")
-    rows = _with_flight(used.join(identity, on="track"), facts).filter(pl.col("range_m") > 0)
-    when = rows["flight"].to_numpy(), rows["time_s"].to_numpy()
-    true, seen = truth.at(*when), as_seen(truth, *when, facts)
-    return PlotError(_rms(_plot_errors(rows, true)), _rms(_plot_errors(rows, seen)), len(rows))
-
-
-def settled_rows(result: TrackingResult, facts: dict[str, Any]) -> "pl.DataFrame":
-    """Return the track rows that are judged, with the `flight` of each: updated, after eight."""
-    import polars as pl
-
-    order = pl.int_range(pl.len()).over("track")
-    rows = result.tracks.filter(pl.col("status") == "updated").filter(order >= _SETTLED)
-    return _with_flight(rows, facts)
-
-
-def _with_flight(rows: "pl.DataFrame", facts: dict[str, Any]) -> "pl.DataFrame":
-    """Add `flight`, found by address or, without one, by Mode A code; drop what is no flight's."""
-    import polars as pl
-
-    flights = pl.DataFrame(facts["flights"]).with_row_index("flight")
-    by_address = flights.filter(pl.col("address") != "").select("flight", "address")
-    by_code = flights.filter(pl.col("address") == "").select("flight", "mode_a")
-    has_address = pl.col("address").fill_null("") != ""
-    named = rows.filter(has_address).join(by_address, on="address")
-    coded = rows.filter(~has_address).join(by_code, on="mode_a")
-    return pl.concat([named, coded], how="diagonal")
-
-
-def _plot_errors(rows: "pl.DataFrame", motion: Motion) -> Array:
-    """Return radial and tangential error (n, 2) in the horizontal plane, metres."""
-    polar = frames.polar_from_enu(motion.position)
-    azimuth = np.radians(rows["azimuth_deg"].to_numpy())
-    radial = rows["range_m"].to_numpy() - polar.range_m
-    tangential = polar.range_m * wrap(azimuth - polar.azimuth)
-    return np.stack([radial, tangential], axis=-1) * np.cos(polar.elevation)[:, None]
-
-
-def _planar_error(reference: Motion, rows: "pl.DataFrame") -> Array:
-    state = rows.select("east_m", "north_m", "east_mps", "north_mps").to_numpy()
-    return state - np.hstack([reference.position[:, :2], reference.velocity[:, :2]])
-
-
-def _planar_cov(rows: "pl.DataFrame") -> Array:
-    """Covariance (n, 4, 4) of the planar states out of the upper triangle's columns."""
-    names = [f"cov_{min(i, j)}_{max(i, j)}" for i in _PLANAR for j in _PLANAR]
-    columns = [rows[name].to_numpy() for name in names]
-    return np.stack(columns, axis=-1).reshape(-1, len(_PLANAR), len(_PLANAR))
-
-
-def _band(dof: int) -> tuple[float, float]:
-    """Return the 95 % band of a chi-square variable over its degrees of freedom."""
-    from scipy.special import chdtri
-
-    return float(chdtri(dof, 0.975)) / dof, float(chdtri(dof, 0.025)) / dof
-
-
-def _rms(vectors: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(np.square(vectors), axis=-1))))
+def _difference(held: Held) -> str:
+    true, seen, straight = held
+    return (
+        f"{true.filter}: {true.position_rmse_m:.0f} m and {true.velocity_rmse_mps:.1f} m/s off the "
+        f"truth, {seen.position_rmse_m:.0f} m and {seen.velocity_rmse_mps:.1f} m/s off what this "
+        "radar would see without noise; the difference is bias, which tracking cannot remove. In "
+        f"straight flight the latter is {straight.position_rmse_m:.0f} m and "
+        f"{straight.velocity_rmse_mps:.1f} m/s, its ANEES {straight.anees:.2f}; a filter of "
+        f"constant velocity cannot be consistent in turns ({seen.anees:.1f} over all flight)."
+    )
