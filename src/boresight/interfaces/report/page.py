@@ -63,6 +63,8 @@ def report(
     comparisons: "Sequence[Comparison]" = (),
     inspection: dict[str, Any] | None = None,
     command: str = "",
+    *,
+    as_seen: "Sequence[Comparison]" = (),
 ) -> Report:
     """Make the report of a tracked recording.
 
@@ -71,6 +73,8 @@ def report(
         comparisons: filters against known truth, where there is one.
         inspection: what `inspect` says of the file; `file` and `sha256` are shown if present.
         command: the command line that made it, for the reader who wants to repeat it.
+        as_seen: the same filters against the truth as the sensor, with its known systematic
+            errors, would see it without noise.
     """
     inspection = inspection or {}
     drawn = [
@@ -81,6 +85,7 @@ def report(
     parts = sections.Parts(
         result=result,
         comparisons=comparisons,
+        as_seen=as_seen,
         inspection=inspection,
         provenance=_provenance(inspection, command),
         plan_caption=view.caption,
@@ -141,6 +146,7 @@ def _facts(parts: sections.Parts) -> str:
         "targets": result.targets.to_dicts(),
         "skipped": result.skipped.to_dicts(),
         "comparisons": [asdict(each) for each in parts.comparisons],
+        "as_seen": [asdict(each) for each in parts.as_seen],
         "recording": parts.inspection,
         "provenance": parts.provenance,
     }

@@ -38,6 +38,7 @@ class Parts:
 
     result: "TrackingResult"
     comparisons: "Sequence[Comparison]"
+    as_seen: "Sequence[Comparison]"
     inspection: dict[str, Any]
     provenance: dict[str, Any]
     plan_caption: str
@@ -51,7 +52,7 @@ def body(parts: Parts) -> str:
         ("plan", "Plan view", _plan(parts)),
         ("residuals", "Residuals", _residuals(parts)),
         ("consistency", "Is the stated uncertainty true?", _consistency(parts)),
-        ("filters", "Filters", tables.filters(parts.comparisons) if parts.comparisons else ""),
+        ("filters", "Filters against the known truth", _filters(parts)),
         ("targets", "Targets", _targets(parts)),
         ("skipped", "What was not used", tables.skipped(parts.result)),
         ("recording", "Recording", tables.recording(parts.inspection)),
@@ -123,7 +124,7 @@ def _contents(kept: Sequence[tuple[str, str, str]]) -> str:
 
 
 def _verdict(parts: Parts) -> str:
-    found = sentences(parts.result, parts.comparisons, parts.inspection)
+    found = sentences(parts.result, parts.comparisons, parts.as_seen, parts.inspection)
     items = "\n".join(map(_sentence, found))
     remarks = "".join(f"<li>{escape(each)}</li>" for each in parts.result.remarks)
     more = f"<h3>Remarks of the tracker</h3><ul>{remarks}</ul>" if remarks else ""
@@ -194,6 +195,11 @@ def _consistency(parts: Parts) -> str:
         f'{words}{NIS_KEY}<div class="grid">{three}</div><div class="halves">{two}</div>'
         f"{tables.nis(parts.result)}"
     )
+
+
+def _filters(parts: Parts) -> str:
+    shown = ((tables.AGAINST_TRUTH, parts.comparisons), (tables.AS_SEEN, parts.as_seen))
+    return "".join(tables.filters(caption, rows) for caption, rows in shown if rows)
 
 
 def _targets(parts: Parts) -> str:

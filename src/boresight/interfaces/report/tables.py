@@ -20,6 +20,8 @@ from boresight.interfaces.report.words import (
 if TYPE_CHECKING:
     from boresight.tracking.result import Comparison, TrackingResult
 
+AGAINST_TRUTH = "Errors against the truth, horizontal; ANEES of a consistent filter is 1"
+AS_SEEN = "Errors against the truth as this sensor, with its own systematic errors, would see it"
 GLYPHS = ("●", "▲", "▼")
 METER_DECADES = 1.0  # the little meter runs from 0.1 to 10, logarithmically
 
@@ -82,13 +84,10 @@ def _meter(row: dict[str, Any], kind: int) -> str:
     )
 
 
-def filters(comparisons: "Sequence[Comparison]") -> str:
+def filters(caption: str, comparisons: "Sequence[Comparison]") -> str:
     """The filters against known truth."""
     heads = ["filter", "position RMSE, m", "velocity RMSE, m/s", "ANEES", "95 % band", "verdict"]
     heads += ["NIS/dof", "updates", "ns per update"]
-    caption = (
-        "Filters against the known truth (horizontal errors; ANEES of a consistent filter is 1)"
-    )
     return table(caption, heads, map(_filter, comparisons))
 
 
@@ -106,6 +105,7 @@ def nis(result: "TrackingResult") -> str:
     """NIS per degree of freedom for each selection of scans."""
     heads = ["scans", "mean", "median", "median of chi-square", "degrees of freedom", "plots"]
     words = {"straight": "straight flight", "straight_second_half": "straight, second half"}
+    words |= {"straight_first_half": "straight, first half"}
     words |= {"all": "all"}
     rows = [
         [text_cell(words.get(name, name.replace("_", " ")))]
@@ -147,7 +147,7 @@ def recording(inspection: dict[str, Any]) -> str:
     heads = ["category", "edition", "sensor", "records", "first", "last", "scan, s"]
     rows = [
         [
-            Cell(f"{row['category']:03d}", str(row["category"]), is_figure=True),
+            text_cell(category(row)),
             text_cell(row.get("edition")),
             text_cell(row.get("sensor")),
             number_cell(row.get("records")),
@@ -157,6 +157,11 @@ def recording(inspection: dict[str, Any]) -> str:
         for row in inspection.get("categories", [])
     ]
     return table("What the recording holds", heads, rows) if rows else ""
+
+
+def category(row: dict[str, Any]) -> str:
+    """Name a category as the field does; a table has none."""
+    return f"CAT{row['category']:03d}" if row.get("category") is not None else "table"
 
 
 def pairs(caption: str, entries: dict[str, Any]) -> str:

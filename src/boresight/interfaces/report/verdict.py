@@ -30,11 +30,12 @@ class Sentence(NamedTuple):
 def sentences(
     result: "TrackingResult",
     comparisons: "Sequence[Comparison]" = (),
+    as_seen: "Sequence[Comparison]" = (),
     inspection: dict[str, Any] | None = None,
 ) -> list[Sentence]:
     """Return the verdict of a result, most important first."""
     parts = (
-        _against_truth(comparisons),
+        _against_truth(comparisons, as_seen),
         _straight(result),
         _turns(result),
         _scatter(result),
@@ -46,21 +47,34 @@ def sentences(
     return [sentence for part in parts for sentence in part]
 
 
-def _against_truth(comparisons: "Sequence[Comparison]") -> Iterator[Sentence]:
+def _against_truth(
+    comparisons: "Sequence[Comparison]", as_seen: "Sequence[Comparison]"
+) -> Iterator[Sentence]:
     if not comparisons:
         return
     best = min(comparisons, key=lambda each: each.position_rmse_m)
-    facts = [f"{escape(each.filter)} {_consistency(each)}" for each in comparisons]
-    is_good = all(
-        each.anees_bounds[0] <= each.anees <= each.anees_bounds[1] for each in comparisons
-    )
-    yield Sentence(
-        "good" if is_good else "attention",
+    text = (
         f"Against the known truth the smallest position error is that of {escape(best.filter)}: "
         f"{figure(best.position_rmse_m, 3)} m, with {figure(best.velocity_rmse_mps, 3)} m/s in "
-        f"velocity (root mean square). ANEES, 1 if consistent, is {', '.join(facts)}.",
-        "filters",
+        f"velocity (root mean square). ANEES, 1 if consistent, is {_consistencies(comparisons)}."
     )
+    yield Sentence("good" if all(map(_is_inside, comparisons)) else "attention", text, "filters")
+    if as_seen:
+        least = min(each.position_rmse_m for each in as_seen)
+        text = (
+            "Against the truth as this sensor sees it, its systematic errors left in, that error "
+            f"is {figure(least, 3)} m, and ANEES is {_consistencies(as_seen)}. The difference is "
+            "the sensor's, not the filter's: it is what a calibration is worth."
+        )
+        yield Sentence("good" if all(map(_is_inside, as_seen)) else "attention", text, "filters")
+
+
+def _is_inside(each: "Comparison") -> bool:
+    return each.anees_bounds[0] <= each.anees <= each.anees_bounds[1]
+
+
+def _consistencies(comparisons: "Sequence[Comparison]") -> str:
+    return ", ".join(f"{escape(each.filter)} {_consistency(each)}" for each in comparisons)
 
 
 def _consistency(each: "Comparison") -> str:

@@ -1,0 +1,170 @@
+"""The command line: what each command takes, and what becomes of whatever goes wrong."""
+
+import shlex
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+from cyclopts import App, CycloptsError, Parameter
+
+from boresight.errors import BoresightError, UsageError
+from boresight.interfaces import door, jobs, pages, terminal
+from boresight.interfaces.answers import Answer
+from boresight.interfaces.terminal import Manner
+
+FAULT = 70
+FLAGS = {"--json": "as_json", "--quiet": "is_quiet", "--debug": "is_debug"}
+EPILOGUE = "Every command also takes --json, --quiet and --debug: see boresight --help."
+
+Job: TypeAlias = Callable[[Manner], Answer]
+File = Annotated[Path, Parameter(help="ASTERIX recording (raw, pcap, ...), CSV or Parquet.")]
+Strict = Annotated[
+    bool,
+    Parameter(
+        negative="", show_default=False, help="Stop at the first damage instead of skipping it."
+    ),
+]
+Columns = Annotated[
+    str | None, Parameter(help="For a table, its columns as OURS=THEIRS,... (range_m=rng,...).")
+]
+Site = Annotated[
+    str | None,
+    Parameter(
+        allow_leading_hyphen=True,
+        help="Place of the sensor as LAT,LON,H: degrees, degrees, metres above the ellipsoid.",
+    ),
+]
+Output = Annotated[Path, Parameter(alias="-o", help="Folder for report.html and the tables.")]
+Figures = Annotated[Path | None, Parameter(alias="-o", help="Folder for the paper's figures.")]
+
+app = App(
+    name="boresight",
+    help=pages.SUMMARY,
+    help_epilogue=EPILOGUE,
+    version_flags=(),
+    help_flags=("--help", "-h"),
+)
+
+
+@app.command
+def inspect(file: File, /, *, strict: Strict = False, columns: Columns = None) -> Job:
+    """Say what a recording holds: format, categories, sensors, times, damage."""
+    return partial(jobs.inspect, file, strict=strict, columns=_columns(columns))
+
+
+@app.command
+def track(
+    file: File,
+    /,
+    *,
+    site: Site = None,
+    sensor: Annotated[
+        str | None, Parameter(help="Track this sensor's plots, SAC/SIC as inspect prints it.")
+    ] = None,
+    filter: Annotated[  # noqa: A002 - the option is --filter
+        str, Parameter(help="Which filter: see boresight cite.")
+    ] = jobs.FILTER,
+    strict: Strict = False,
+    columns: Columns = None,
+    output: Output | None = None,
+) -> Job:
+    """Turn a recording into tracks, tables and a report."""
+    return partial(
+        jobs.track,
+        file,
+        site=door.site(site) if site is not None else None,
+        sensor=sensor,
+        name=filter,
+        strict=strict,
+        columns=_columns(columns),
+        folder=output,
+    )
+
+
+@app.command
+def demo(*, output: Output = Path("boresight-demo")) -> Job:
+    """Track the built-in recording, compare with its known truth, write the report."""
+    return partial(jobs.demo, output)
+
+
+@app.command
+def reproduce(
+    key: Annotated[str, Parameter(help="A paper's key, such as aditya, or all.")],
+    /,
+    *,
+    runs: Annotated[int | None, Parameter(help="Runs instead of the paper's number.")] = None,
+    seed: Annotated[int | None, Parameter(help="Seed instead of the usual one.")] = None,
+    output: Figures = None,
+) -> Job:
+    """Repeat a paper's tables, figures and claims, with a verdict for each."""
+    return partial(jobs.reproduce, key, runs=runs, seed=seed, folder=output)
+
+
+@app.command
+def cite(name: Annotated[str, Parameter(help="A filter's name, such as mekf.")], /) -> Job:
+    """Print the reference of a filter, and where the code differs from it."""
+    return partial(jobs.cite, name)
+
+
+def _columns(text: str | None) -> dict[str, str] | None:
+    return door.columns(text) if text is not None else None
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line and return its exit code; only Ctrl-C and a broken pipe get out."""
+    tokens, manner = _manner(arguments)
+    try:
+        job = _parse(tokens)
+        answer = job(manner) if job else None
+        if answer is not None:
+            terminal.show(answer, manner)
+        sys.stdout.flush()
+    except (BrokenPipeError, KeyboardInterrupt):
+        raise  # whoever called handles both, wherever they happen
+    except Exception as error:  # noqa: BLE001 - a user is told of any fault, and of ours as ours
+        return _fail(error, manner)
+    return answer.exit_code if answer is not None else 0
+
+
+def _manner(arguments: Sequence[str]) -> tuple[list[str], Manner]:
+    """Part the options of every command, wherever they stand, from the command's own."""
+    end = list(arguments).index("--") if "--" in arguments else len(arguments)
+    given = {FLAGS[each]: True for each in arguments[:end] if each in FLAGS}
+    rest = [each for each in arguments[:end] if each not in FLAGS]
+    command = shlex.join(["boresight", *arguments])
+    return [*rest, *arguments[end:]], Manner(command=command, **given)
+
+
+def _parse(tokens: Sequence[str]) -> Job | None:
+    """Return the job of a command line; None where cyclopts has printed a page of help."""
+    try:
+        job: Job | None = app(
+            tokens, exit_on_error=False, print_error=False, result_action="return_value"
+        )
+    except CycloptsError as error:
+        known = next((each for each in tokens if each in pages.COMMANDS), "")
+        step = f"boresight {known} --help" if known else "boresight --help"
+        raise UsageError(" ".join(str(error).split()), next_step=step) from None
+    return job
+
+
+def _fail(error: Exception, manner: Manner) -> int:
+    """Tell the user what went wrong; return the exit code."""
+    if manner.is_debug:
+        traceback.print_exception(error)
+    if not isinstance(error, BoresightError):
+        error = FaultError(
+            f"boresight failed by a fault of its own: {type(error).__name__}: {error}",
+            next_step="run again with --debug and report what it prints",
+        )
+    terminal.complain(error, manner)
+    return error.exit_code
+
+
+class FaultError(BoresightError):
+    """boresight itself is wrong."""
+
+    exit_code = FAULT

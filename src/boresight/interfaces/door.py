@@ -1,0 +1,82 @@
+"""What a user types, turned into what the floors below take; a mistake is named with its cure."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from boresight.errors import OutputError, UsageError
+
+if TYPE_CHECKING:
+    from boresight.maths.frames import Site
+
+
+def site(text: str) -> "Site":
+    """Read `LAT,LON,H`: degrees, degrees, metres above the ellipsoid.
+
+    Raises:
+        UsageError: not three numbers, or no place on Earth.
+    """
+    from boresight.maths.frames import Site
+
+    try:
+        latitude, longitude, height = (float(part) for part in text.split(","))
+    except ValueError:
+        raise UsageError(
+            f"--site {text!r} is not three numbers parted by commas",
+            next_step="give degrees, degrees and metres above the ellipsoid, north and east "
+            "positive: --site 41.3007,2.1021,27.3",
+        ) from None
+    return Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
+
+
+def sensor(text: str, known: Sequence[str]) -> str:
+    """Find the sensor a user means among those of a recording: `20/129`, or `020/129`.
+
+    Raises:
+        UsageError: the recording has no such sensor.
+    """
+    parts = text.split("/")
+    is_code = len(parts) == 2 and all(part.isdecimal() for part in parts)
+    name = "/".join(str(int(part)) for part in parts) if is_code else text
+    if name not in known:
+        raise UsageError(
+            f"no plot is from sensor {text!r}",
+            why=f"the recording has {', '.join(known) or 'none'}",
+            next_step=f"--sensor {known[0]}" if known else "boresight inspect FILE",
+        )
+    return name
+
+
+def columns(text: str) -> dict[str, str]:
+    """Read `OURS=THEIRS,...`: which column of a table holds what.
+
+    Raises:
+        UsageError: a part without an equals sign.
+    """
+    pairs = [part.partition("=") for part in text.split(",")]
+    if not all(ours.strip() and theirs.strip() for ours, _, theirs in pairs):
+        raise UsageError(
+            f"--columns {text!r} is not OURS=THEIRS, parted by commas",
+            next_step="for example: --columns range_m=rng,azimuth_deg=az,time_s=t",
+        )
+    return {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
+
+
+def folder(path: Path) -> Path:
+    """Make a folder for results, before any work is done for them.
+
+    Raises:
+        OutputError: it cannot be made, or nothing can be written into it.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / ".boresight-probe"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(
+            f"results cannot be written to {path}",
+            why=error.strerror or str(error),
+            next_step="name a folder you may write to, with -o DIR",
+        ) from error
+    return path

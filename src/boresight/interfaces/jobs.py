@@ -1,0 +1,167 @@
+"""The commands' work: each calls the floors below and returns an answer; none of them prints."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from boresight.interfaces import door, screens
+from boresight.interfaces.answers import Answer
+from boresight.interfaces.terminal import Manner, progress
+
+if TYPE_CHECKING:
+    from boresight.maths.frames import Site
+    from boresight.tracking.result import TrackingResult
+
+FILTER = "mekf"
+REPORT = "report.html"
+TABLES = ("tracks.parquet", "tracks.csv", "tracks.geojson")
+AGAINST_TRUTH = "Against the truth"
+AS_SEEN = "Against the truth as this radar, with its own errors, would see it without noise"
+
+
+def inspect(
+    file: Path, manner: Manner, *, strict: bool, columns: Mapping[str, str] | None
+) -> Answer:
+    """Say what a recording holds."""
+    from boresight.formats import recording
+
+    with progress(f"Reading {file.name}", manner) as watch:
+        found = recording.inspect(file, strict=strict, columns=columns, progress=watch.count)
+    return Answer(
+        content=found,
+        screen=lambda _width: screens.inspected(str(file), found),
+        remarks=found.get("notes", ()),
+    )
+
+
+def track(
+    file: Path,
+    manner: Manner,
+    *,
+    site: "Site | None",
+    sensor: str | None,
+    name: str,
+    strict: bool,
+    columns: Mapping[str, str] | None,
+    folder: Path | None,
+) -> Answer:
+    """Track a recording; with a folder, write tables and the report into it."""
+    from boresight import catalogue
+    from boresight.formats.recording import read_recording
+    from boresight.interfaces.report import report
+    from boresight.tracking.tracker import track as track_plots
+
+    chosen, target = catalogue.lookup(name), door.folder(folder) if folder else None
+    with progress(f"Reading {file.name}", manner) as watch:
+        read = read_recording(file, strict=strict, columns=columns, progress=watch.count)
+    source = door.sensor(sensor, sensors(read.summary)) if sensor else None
+    with progress(f"Tracking with {name}", manner) as watch:
+        result = track_plots(
+            read.plots, site=site, sensor=source, filter=chosen, progress=watch.say
+        )
+    outputs = []
+    if target:
+        about = read.summary | {"file": file.name, "sha256": sha256(file)}
+        with progress("Writing", manner):
+            page = report(result, inspection=about, command=manner.command)
+            outputs = [str(page.save(target / REPORT)), *write_tables(result, target)]
+    return Answer(
+        content=tracking_content(result, outputs),
+        screen=lambda width: screens.tracked(result, outputs, width),
+        remarks=[*read.summary.get("notes", ()), *result.remarks],
+    )
+
+
+def sensors(summary: Mapping[str, Any]) -> list[str]:
+    """The sensors that a recording has plots of, as `inspect` names them."""
+    plots = [row for row in summary["categories"] if row["category"] in (None, 10, 48)]
+    return [row["sensor"] for row in plots]
+
+
+def sha256(file: Path) -> str:
+    """The SHA-256 of a file, in hexadecimal."""
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
+def write_tables(result: "TrackingResult", folder: Path) -> list[str]:
+    """Write the tracks as Parquet, CSV and, where the site is known, GeoJSON; return the paths."""
+    from boresight.formats.output import write_table
+
+    has_places = result.tracks["latitude_deg"].count() > 0
+    names = [name for name in TABLES if has_places or not name.endswith(".geojson")]
+    return [str(write_table(result.tracks, folder / name, "tracks")) for name in names]
+
+
+def tracking_content(result: "TrackingResult", outputs: Sequence[str]) -> dict[str, Any]:
+    """The object that `boresight track --json` prints."""
+    return {
+        "plots": result.plots,
+        "used": result.used,
+        "tracks": len(result.targets),
+        "updates": int((result.tracks["status"] == "updated").sum()),
+        "filter": result.filter,
+        "nis_per_dof": result.nis["all"]["mean"],
+        "rejected": result.rejected,
+        "outputs": list(outputs),
+        "nis": result.nis,
+        "skipped": result.skipped.to_dicts(),
+        "settings": result.settings,
+        "remarks": result.remarks,
+        "targets": result.targets.to_dicts(),
+    }
+
+
+def demo(folder: Path, manner: Manner) -> Answer:
+    """Track the recording in the package, compare with its truth, write report and tables."""
+    from boresight.experiments.demo import run_demo
+    from boresight.interfaces.report import report
+
+    target = door.folder(folder)
+    with progress("Tracking the built-in recording", manner) as watch:
+        found = run_demo(progress=watch.say)
+    result = list(found.results.values())[-1]
+    result = replace(result, remarks=[*found.remarks, *result.remarks])
+    about = found.recording.summary | {"file": "The built-in demo recording"}
+    page = report(result, found.comparisons, about, manner.command, as_seen=found.as_seen)
+    written = page.save(target / REPORT)
+    outputs = [str(written), *write_tables(result, target)]
+    content = tracking_content(result, outputs) | {
+        "report": str(written),
+        "comparisons": [asdict(each) for each in found.comparisons],
+        "as_seen": [asdict(each) for each in found.as_seen],
+        "plot_error": found.plot_error._asdict(),
+        "planted": found.facts["radar"],
+    }
+    return Answer(
+        content=content,
+        screen=lambda width: [
+            screens.compared(AGAINST_TRUTH, found.comparisons),
+            screens.compared(AS_SEEN, found.as_seen),
+            *screens.tracked(result, outputs, width),
+        ],
+        remarks=result.remarks,
+    )
+
+
+def reproduce(
+    key: str, manner: Manner, *, runs: int | None, seed: int | None, folder: Path | None
+) -> Answer:
+    """Repeat a paper's tables, figures and claims."""
+    from boresight.experiments.reproduce import SEED
+    from boresight.experiments.reproduce import reproduce as repeat
+
+    output = door.folder(folder) if folder else None
+    with progress(f"Reproducing {key}", manner):
+        found = repeat(key, runs=runs, seed=SEED if seed is None else seed, output=output)
+    return Answer(content=found, screen=lambda _width: screens.reproduced(key, found))
+
+
+def cite(name: str, _manner: Manner) -> Answer:
+    """Give the reference of a filter."""
+    from boresight import catalogue
+
+    found = catalogue.cite(name)
+    return Answer(content=found, screen=lambda _width: screens.cited(found))

@@ -1,0 +1,194 @@
+"""What a person sees: tables that are readable at 80 columns and use more where there is more."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from boresight.interfaces.report.plan import title
+from boresight.interfaces.report.tables import category
+from boresight.interfaces.report.words import clock, figure, percent
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from boresight.tracking.result import Comparison, TrackingResult
+
+WIDE = 100
+WORST = 8
+NIS_WORDS = {
+    "all": "all scans",
+    "straight": "straight flight",
+    "straight_first_half": "straight flight, first half of the recording",
+    "straight_second_half": "straight flight, second half",
+}
+
+
+def _table(heading: str, *heads: str, left: int = 1) -> "Table":
+    """A table whose first `left` columns are words and whose others are figures."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=heading, box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    table.title_justify, table.title_style = "left", "bold"
+    for index, head in enumerate(heads):
+        side: Literal["left", "right"] = "left" if index < left else "right"
+        table.add_column(head, justify=side, no_wrap=True, header_style="dim")
+    return table
+
+
+def _text(words: str, style: str = "") -> "RenderableType":
+    from rich.text import Text
+
+    return Text(words, style=style)
+
+
+def inspected(path: str, found: dict[str, Any]) -> "list[RenderableType]":
+    """The screen of `boresight inspect`."""
+    skipped = found["skipped_bytes"]
+    read = f"{figure(skipped)} bytes skipped" if skipped else "all of them read"
+    head = f"{found['format']}, framing {found['framing']}, {figure(found['bytes'])} bytes, {read}"
+    table = _table("", "category", "edition", "sensor", "records", "first", "last", "scan", left=3)
+    for row in found["categories"]:
+        scan = row.get("scan_s")
+        table.add_row(
+            category(row),
+            row.get("edition") or "–",
+            row.get("sensor") or "–",
+            figure(row["records"]),
+            clock(row.get("first_s")),
+            clock(row.get("last_s")),
+            f"{scan:.3f} s" if scan else "–",
+        )
+    table.title = None
+    addresses = f"{figure(found['addresses'])} different 24-bit addresses"
+    return [_text(path, "bold"), _text(head), _text(""), table, *_damage(found), _text(addresses)]
+
+
+def _damage(found: dict[str, Any]) -> "list[RenderableType]":
+    """Say where the file is damaged, the first few places."""
+    places = found.get("damaged", [])
+    lines = [f"damaged at byte {figure(each['offset'])}: {each['reason']}" for each in places[:5]]
+    if len(places) > len(lines):
+        lines.append(f"and {len(places) - len(lines)} more places: see --json")
+    lines += [
+        f"category {each['category']} is not read: {figure(each['blocks'])} blocks"
+        for each in found.get("unknown_categories", [])
+    ]
+    return [_text(line, "yellow") for line in lines]
+
+
+def tracked(result: "TrackingResult", outputs: Sequence[str], width: int) -> "list[RenderableType]":
+    """The screen of `boresight track`."""
+    head = (
+        f"{figure(result.used)} of {figure(result.plots)} plots "
+        f"({percent(result.used, result.plots)}) in {figure(len(result.targets))} tracks, "
+        f"filter {result.filter}; {figure(result.rejected)} outside their track's gate"
+    )
+    parts = [_text(head, "bold"), _text(""), _nis(result), _worst(result, width)]
+    if not result.skipped.is_empty():
+        parts.append(_skipped(result))
+    return [*parts, *_written(outputs)]
+
+
+def _nis(result: "TrackingResult") -> "RenderableType":
+    heading = "NIS per degree of freedom (1 is consistent)"
+    table = _table(heading, "", "mean", "median", "plots")
+    for name, entry in result.nis.items():
+        words = NIS_WORDS.get(name, name.replace("_", " "))
+        mean, median = (figure(entry.get(key), 3) for key in ("mean", "median"))
+        table.add_row(words, mean, median, f"{entry.get('scans', 0):,.0f}")
+    return table
+
+
+def _worst(result: "TrackingResult", width: int) -> "RenderableType":
+    shown = result.targets.head(WORST).to_dicts()
+    more = ["from", "to", "restarts"] if width >= WIDE else []
+    heading = f"The {len(shown)} worst of {len(result.targets):,} targets"
+    heads = ["target", "verdict", *more[:2], "plots", "rejected", *more[2:], "NIS/dof"]
+    table = _table(heading, *heads, "95 % band", left=2)
+    for row in shown:
+        optional = [clock(row["first_s"]), clock(row["last_s"]), figure(row["restarts"])]
+        optional = optional if more else []
+        table.add_row(
+            title(row),
+            row["verdict"] or "–",
+            *optional[:2],
+            figure(row["plots"]),
+            figure(row["rejected"]),
+            *optional[2:],
+            figure(row["nis_per_dof"], 3),
+            f"{figure(row['nis_low'], 3)} – {figure(row['nis_high'], 3)}",
+        )
+    return table
+
+
+def _skipped(result: "TrackingResult") -> "RenderableType":
+    table = _table("Plots not used", "reason", "meaning", "plots", left=2)
+    table.columns[1].no_wrap = False
+    for row in result.skipped.to_dicts():
+        table.add_row(str(row["reason"]).replace("_", " "), row["meaning"], figure(row["count"]))
+    return table
+
+
+def _written(outputs: Iterable[str]) -> "list[RenderableType]":
+    return [_text(f"wrote {path}", "green") for path in outputs]
+
+
+def compared(heading: str, comparisons: "Sequence[Comparison]") -> "RenderableType":
+    """Filters against known truth."""
+    heads = ("filter", "position", "velocity", "ANEES", "95 % band", "NIS/dof", "per update")
+    table = _table(heading, *heads)
+    for each in comparisons:
+        low, high = each.anees_bounds
+        table.add_row(
+            each.filter,
+            f"{figure(each.position_rmse_m, 3)} m",
+            f"{figure(each.velocity_rmse_mps, 3)} m/s",
+            figure(each.anees, 3),
+            f"{low:.2f} – {high:.2f}",
+            figure(each.nis_per_dof, 3),
+            _duration(each.ns_per_update),
+        )
+    return table
+
+
+def _duration(ns: float) -> str:
+    return f"{figure(ns / 1000, 3)} µs" if ns >= 1000 else f"{figure(ns, 3)} ns"
+
+
+def reproduced(key: str, found: dict[str, Any]) -> "list[RenderableType]":
+    """The screen of `boresight reproduce`."""
+    claims = found["claims"]
+    table = _table(f"{key}: {len(claims)} claims", "claim", "published", "ours", "verdict", left=4)
+    for column in table.columns:
+        column.no_wrap, column.overflow = False, "fold"
+    table.columns[0].no_wrap = True
+    styles = {"reproduces": "green", "in band": "green", "does not reproduce": "red"}
+    for each in claims:
+        verdict = _text(each["verdict"], styles.get(each["verdict"], "yellow"))
+        values = (_value(each[name]) for name in ("published", "ours"))
+        table.add_row(each["id"], *values, verdict)
+    counts = {each["verdict"]: 0 for each in claims}
+    for each in claims:
+        counts[each["verdict"]] += 1
+    total = ", ".join(f"{number} {verdict}" for verdict, number in counts.items())
+    return [table, _text(f"{total}; seed {found['seed']}")]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float):
+        return figure(value)
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(_value, value))
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_value(each)}" for name, each in value.items())
+    return "–" if value is None else str(value)
+
+
+def cited(found: dict[str, Any]) -> "list[RenderableType]":
+    """The screen of `boresight cite`: BibTeX as it is, ready to be piped into a file."""
+    differs = f"Differs from it: {found['differs']}" if found["differs"] else ""
+    from rich.text import Text
+
+    bibtex = Text(found["bibtex"], no_wrap=True, overflow="ignore")
+    return [bibtex, *([_text(""), _text(differs)] if differs else [])]
