@@ -36,24 +36,23 @@ Mu = Literal["printed", "predicted", "second order", "none"]
 _SEQUENTIAL = "use the sequential filter, mekf, to choose between readings of mu"
 
 
-def _angles(components: Sequence[Component]) -> list[tuple[int, Component]]:
-    return [(i, c) for i, c in enumerate(components) if c.is_angle]
+def _angles(
+    z: Array, components: Sequence[Component], mean: Array, distance: Any
+) -> list[tuple[Any, Array, Any, Any]]:
+    """Weight, gradient, innovation and noise variance of every angle, at `mean`.
 
-
-def _weights(components: Sequence[Component], mean: Array, distance: Any) -> dict[str, Any]:
-    """cos² of the elevation for azimuth terms, 1 for elevation terms (erratum K3).
-
-    Where no elevation is measured it follows from the azimuth's gradient, 1 / (distance cos).
+    The weight is what one squared radian of that angle bends the range by, over its radius: 1 for
+    elevation, cos² of the elevation for azimuth (erratum K3). It is 1 / (r |gradient|)², which
+    holds in the plane and where no elevation is measured too. A missing angle weighs nothing.
     """
-    named = {component.name: component for component in components}
-    weights = {"elevation_rad": 1.0}
-    if "elevation_rad" in named:
-        cos = np.cos(named["elevation_rad"].value(mean))
-        weights["azimuth_rad"] = cos * cos
-    elif "azimuth_rad" in named:
-        _, h = gradient(named["azimuth_rad"].value, mean)
-        weights["azimuth_rad"] = 1.0 / (distance * distance * (h @ h))
-    return weights
+    found = []
+    for component, measured in zip(components, z, strict=True):
+        if component.is_angle:
+            predicted, h = gradient(component.value, mean)
+            there, nu = innovation(component, measured, predicted)
+            weight = there / (distance * distance * (h @ h))
+            found.append((weight, h, nu, component.sigma * component.sigma))
+    return found
 
 
 def _curvature(
@@ -61,31 +60,27 @@ def _curvature(
 ) -> tuple[Any, Any]:
     """Mean and variance of what linearising the range at `mean` leaves out.
 
-    kashyap (11) and aditya (16), (17) with errata K3 and A4; an angle that is missing adds nothing.
+    kashyap (11) and aditya (16), (17) with errata K3 and A4.
     """
-    weights = _weights(components, mean, distance)
     mu, variance = 0.0, 0.0
-    for i, angle in _angles(components):
-        there, nu = innovation(angle, z[i], angle.value(mean))
-        s2, weight = angle.sigma * angle.sigma, weights[angle.name] * there
+    for weight, _, nu, s2 in _angles(z, components, mean, distance):
         mu = mu + distance / 2 * weight * (nu * nu - s2)
         variance = variance + distance * distance / 2 * weight * weight * s2 * s2
     return mu, variance
 
 
 def _second_order(
-    components: Sequence[Component], latest: Gaussian, distance: Any
+    z: Array, components: Sequence[Component], latest: Gaussian, distance: Any
 ) -> tuple[Any, Any]:
     """Second-order mean and variance of the range at an updated point (erratum K4)."""
     mean, cov = latest
-    weights = _weights(components, mean, distance)
-    rows = [(weights[a.name], gradient(a.value, mean)[1]) for _, a in _angles(components)]
+    rows = _angles(z, components, mean, distance)
     mu, variance = 0.0, 0.0
-    for w, h in rows:
-        mu = mu + distance / 2 * w * (h @ cov @ h)
-        for other, g in rows:
+    for weight, h, _, _ in rows:
+        mu = mu + distance / 2 * weight * (h @ cov @ h)
+        for other, g, _, _ in rows:
             covariance = h @ cov @ g
-            variance = variance + distance * distance / 2 * w * other * covariance * covariance
+            variance = variance + distance * distance / 2 * weight * other * covariance * covariance
     return mu, variance
 
 
@@ -149,7 +144,7 @@ def update(
         if mu == "predicted":  # the residual is that of the predicted point: (11), erratum K4
             shift = shift + h @ (latest.mean - prior.mean)
         elif mu == "second order":
-            shift, extra = _second_order(components, latest, distance)
+            shift, extra = _second_order(z, components, latest, distance)
         return Correction(at, 0.0 if mu == "none" else shift, extra if added_variance else 0.0)
 
     return update_sequential(prior, z, components, order=order, correct=correct)

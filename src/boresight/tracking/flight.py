@@ -16,7 +16,7 @@ from boresight.maths.frames import Site, enu_at_height
 from boresight.tracking.gating import ManoeuvreGate
 
 Array = Any
-# What a manoeuvre may do, as a standard deviation: 3 m/s² standing (a car), 6 at 100 m/s and 10.5 at
+# What a manoeuvre may do, as a standard deviation: 3 m/s² standing (a car), 6 at 100 and 10.5 at
 # 250 m/s, where 30 degrees of bank make 5.7; the gate lies four of them out.
 MANOEUVRE_MPS2 = 3.0
 MANOEUVRE_RADPS = 0.03

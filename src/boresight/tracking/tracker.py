@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 Array = Any
-Progress = Callable[[str], None]
+Progress = Callable[[float, float], None]
 HIGHEST_M, LOWEST_M = 30_000.0, -1_500.0  # pressure altitudes outside are garbled
 NOWHERE = Site(latitude_deg=45.0, longitude_deg=0.0, height_m=0.0)
 
@@ -48,16 +48,16 @@ def track(
             relative to a nominal place.
         sensor: which sensor ("SAC/SIC") if the table has several; left out: the busiest.
         noise: of the radar and its targets; left out: found from the plots.
-        progress: called with the name of each stage.
+        progress: called with how much is done, of how much.
 
     Raises:
         UsageError: the sensor is not in the table.
         DataError: no plot can be used.
     """
-    say = progress or (lambda _: None)
+    say = progress or (lambda _done, _total: None)
     remarks: list[str] = []
     plots = _one_sensor(plots, sensor, remarks)
-    say("sorting plots by identity")
+    say(0, 4)
     found = sort_by_identity(plots)
     if not len(found.row):
         raise DataError(
@@ -68,12 +68,12 @@ def track(
     case = _case(plots, found)
     place, how = site or NOWHERE, "given"
     if noise is None:
-        say("choosing the noise")
+        say(1, 4)
         noise, how = _find_noise(case, filter, place)
-    say("filtering")
+    say(2, 4)
     recursion = recursion_for(filter, noise, place, case.flights.z.shape[1])
     result = fly(case.flights, recursion, place)
-    say("judging")
+    say(3, 4)
     settings = _settings(case, site, noise, how)
     return _result(case, result, filter.name, site, settings, remarks)
 
