@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boresight.lanes import gradient
 from boresight.maths.angles import wrap
 
 any_angle = st.floats(-1e4, 1e4)
@@ -37,3 +38,9 @@ def test_arrays_wrap_as_their_elements_do_and_are_left_alone():
     np.testing.assert_array_equal(wrapped, one_by_one)
     np.testing.assert_array_equal(angles, before)
     assert np.isnan(wrapped[0, 2])
+
+
+def test_wrapping_leaves_the_slope_alone():
+    wrapped, slope = gradient(lambda x: wrap(x[0] * 2), np.array([5.0]))
+    assert wrapped == pytest.approx(10 - 4 * np.pi)
+    assert slope == [2.0]

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boresight.errors import UsageError
+from boresight.lanes import gradient
 from boresight.maths import frames
 from boresight.maths.frames import Site
 
@@ -164,3 +165,16 @@ def test_a_site_that_is_nowhere_is_refused(wrong):
         Site(**(place | wrong))
     with pytest.raises(UsageError):
         Site(**(place | {"latitude_deg": float("nan")}))
+
+
+@each_site
+def test_the_gradient_of_height_is_the_vertical_at_the_target(site):
+    """Recorded and differentiated as a formula: up at the target, in the site's frame."""
+    enu = np.array([120 * km, -80 * km, 6 * km])
+    place = frames.geodetic_from_enu(enu, site)
+    higher = frames.enu_from_geodetic(
+        place.latitude_deg, place.longitude_deg, place.height_m + 1 * km, site
+    )
+    height, vertical = gradient(lambda p: frames.ellipsoid_height(p[0], p[1], p[2], site), enu)
+    assert height == pytest.approx(place.height_m, abs=um)
+    np.testing.assert_allclose(vertical, (higher - enu) / km, atol=1e-11)
