@@ -1,9 +1,9 @@
 """Build the recording that the package ships: `python scripts/build_demo.py`.
 
-An invented sky (`demo_traffic`) is observed by a radar with known errors (`demo_radar`) and heard
-by an ADS-B station (`demo_adsb`); what they report is written as ASTERIX (`demo_asterix`), beside
-the truth (`demo_truth`) and the planted facts. The bytes are shipped, not built by the user: a
-rounding that differs between processors may flip a quantum.
+An invented sky (`demo_traffic`, flown by `demo_flight`) is observed by a radar with known errors
+(`demo_radar`) and heard by an ADS-B station (`demo_adsb`); what they report is written as ASTERIX
+(`demo_asterix`), beside the truth (`demo_truth`) and the planted facts. The bytes are shipped, not
+built by the user: a rounding that differs between processors may flip a quantum.
 """
 
 import json
@@ -18,8 +18,9 @@ import demo_adsb
 import demo_asterix
 import demo_radar
 import demo_truth
-from demo_traffic import CODE_CHANGE_S, DURATION_S, SITE, sky
-from demo_traffic import Path as FlownPath
+from demo_flight import DURATION_S, SITE
+from demo_flight import Path as FlownPath
+from demo_traffic import CODE_CHANGE_S, sky
 
 SEED = 2026
 FOLDER = Path(__file__).parents[1] / "src" / "boresight" / "demo"

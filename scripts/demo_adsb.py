@@ -10,7 +10,7 @@ import polars as pl
 
 from boresight.maths import frames
 from boresight.models.atmosphere import EffectiveEarth
-from demo_traffic import (
+from demo_flight import (
     DURATION_S,
     SITE,
     Array,

@@ -10,8 +10,8 @@ import numpy as np
 import polars as pl
 
 from boresight.formats.encode import encode_block, encode_records
+from demo_flight import FOOT, SITE, Array
 from demo_radar import RADAR, SCANS
-from demo_traffic import FOOT, SITE, Array
 
 EPOCH_S = 43_200.0  # noon: when the recording begins
 EDITIONS = {34: "1.29", 48: "1.30", 21: "2.4"}

@@ -13,8 +13,7 @@ import polars as pl
 
 from boresight.maths import frames
 from boresight.models.atmosphere import EffectiveEarth, ExponentialAtmosphere
-from demo_traffic import (
-    CODE_CHANGE_S,
+from demo_flight import (
     DURATION_S,
     FOOT,
     SITE,
@@ -23,6 +22,7 @@ from demo_traffic import (
     ellipsoid_height,
     pressure_altitude_m,
 )
+from demo_traffic import CODE_CHANGE_S
 
 NM = 1852.0
 AIR = ExponentialAtmosphere()

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 from scipy.interpolate import CubicHermiteSpline
 
-from demo_traffic import DURATION_S, Path
+from demo_flight import DURATION_S, Path
 
 TOLERANCE_M = 0.05
 STEPS_S = (32.0, 16.0, 8.0, 4.0, 2.0, 1.0, 0.5)
