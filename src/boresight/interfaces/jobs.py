@@ -59,7 +59,7 @@ def track(
     source = door.sensor(sensor, sensors(read.summary)) if sensor else None
     with progress(f"Tracking with {name}", manner) as watch:
         result = track_plots(
-            read.plots, site=site, sensor=source, filter=chosen, progress=watch.say
+            read.plots, site=site, sensor=source, filter=chosen, progress=watch.count
         )
     outputs = []
     if target:

@@ -1,7 +1,9 @@
 """The verbs a user types in Python: friendly over what is exact below."""
 
 from collections.abc import Sequence
-from typing import Any
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,8 +13,15 @@ from boresight.filters.recursion import Estimate, run_recursion
 from boresight.filters.start import one_plot
 from boresight.filters.stream import Stream
 from boresight.maths import Gaussian
+from boresight.maths.frames import Site
 from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from boresight.interfaces.report import Report
+    from boresight.tracking.result import TrackingResult
 
 Array = Any
 
@@ -94,3 +103,57 @@ def stream(
     return Stream(
         catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor), targets
     )
+
+
+def read(path: str | PathLike[str], *, strict: bool = False) -> "pl.DataFrame":
+    """Plots of a recording as a Polars frame.
+
+    Args:
+        path: ASTERIX (raw blocks, pcap and the framings recorders use), CSV or Parquet.
+        strict: stop at the first damaged block instead of skipping and counting it.
+
+    Raises:
+        MissingInputError: the file is not there or cannot be read.
+        DataError: the file is not what it should be; names the place.
+    """
+    from boresight.formats.recording import read_recording
+
+    return read_recording(Path(path), strict=strict).plots
+
+
+def inspect(path: str | PathLike[str]) -> dict[str, Any]:
+    """What a recording holds: format, framing, categories with editions, sensors, damage."""
+    from boresight.formats import recording
+
+    return recording.inspect(Path(path))
+
+
+def track(
+    plots: "pl.DataFrame",
+    *,
+    site: Site | tuple[float, float, float] | None = None,
+    sensor: str | None = None,
+    filter: str = "mekf",  # noqa: A002 - the field's word
+) -> "TrackingResult":
+    """Tracks of every identified target of one radar.
+
+    Args:
+        plots: what `read` gives.
+        site: of the radar: latitude and longitude in degrees, height above the ellipsoid in m.
+        sensor: "SAC/SIC", if the plots are of several.
+        filter: of the catalogue.
+    """
+    from boresight.tracking.tracker import track as track_plots
+
+    place = site
+    if place is not None and not isinstance(place, Site):
+        latitude, longitude, height = place
+        place = Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
+    return track_plots(plots, site=place, sensor=sensor, filter=catalogue.lookup(filter))
+
+
+def report(tracks: "TrackingResult", **about: Any) -> "Report":
+    """A report on one page: `.html`, `.save(path)`, and shown by itself in a notebook."""
+    from boresight.interfaces.report import report as build
+
+    return build(tracks, **about)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from boresight.interfaces.report.plan import title
 from boresight.interfaces.report.tables import category
-from boresight.interfaces.report.words import clock, figure, percent
+from boresight.interfaces.report.words import NIS_WORDS, clock, figure, percent
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -15,12 +15,6 @@ if TYPE_CHECKING:
 
 WIDE = 100
 WORST = 8
-NIS_WORDS = {
-    "all": "all scans",
-    "straight": "straight flight",
-    "straight_first_half": "straight flight, first half of the recording",
-    "straight_second_half": "straight flight, second half",
-}
 
 
 def _table(heading: str, *heads: str, left: int = 1) -> "Table":

@@ -23,12 +23,12 @@ from boresight.interfaces.report.residuals import (
 if TYPE_CHECKING:
     import polars as pl
 
-TICKS = {"tickvals": [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20, 50, 100], "type": "log"}
+LEAST = 0.1  # targets below it are drawn at it; their own figure shows where one points
 
 
 def panels(residuals: "pl.DataFrame", targets: "pl.DataFrame") -> list[Panel]:
     """Draw the normalised innovation squared of the plots used, with its chi-square bounds."""
-    used = residuals.filter(residuals["used"] & residuals["nis"].is_not_null())
+    used = residuals.filter(residuals["used"] & residuals["nis"].is_finite())
     if used.is_empty():
         return []
     return [*_against(used), _law(used), _targets(targets)]
@@ -55,9 +55,9 @@ def _against(used: "pl.DataFrame") -> list[Panel]:
     drawn = [_binned(used, against) for against in AGAINST]
     seen = np.concatenate([values for _, values in drawn])
     seen = np.append(seen[np.isfinite(seen) & (seen > 0)], 1.0)
-    reach = [float(np.log10(seen.min() * 0.9)), float(np.log10(seen.max() * 1.1))]
+    scale = _log_scale(seen.min() * 0.9, seen.max() * 1.1)
     for panel, _ in drawn:
-        panel.chart["layout"]["yaxis"]["range"] = reach
+        panel.chart["layout"]["yaxis"] |= scale
     return [panel for panel, _ in drawn]
 
 
@@ -72,8 +72,9 @@ def _binned(used: "pl.DataFrame", against: Against) -> tuple[Panel, Floats]:
     data = charts.band(centre, low, high, f"95 % band, {groups[-1][0]}")
     for (name, color, _), (mean, _dof, number) in zip(groups, means, strict=True):
         data.append(_mean_line(centre, mean, number, name, color))
-    y = charts.axis("NIS / dof", **TICKS)
-    layout = charts.layout(xaxis=across(against, bounds), yaxis=y, shapes=[_ideal()])
+    layout = charts.layout(
+        xaxis=across(against, bounds), yaxis=charts.axis("NIS / dof"), shapes=[_ideal()]
+    )
     alt = f"NIS per degree of freedom against {against.words}, with its 95 % chi-square band"
     panel = Panel(f"nis-{against.column.split('_')[0]}", {"data": data, "layout": layout}, alt)
     return panel, np.concatenate([mean for mean, _, _ in means])
@@ -102,6 +103,15 @@ def _mean_line(x: Chart, mean: Floats, number: Floats, name: str, color: str) ->
         customdata=charts.typed(number),
         hovertemplate=f"{name}: %{{y:.2f}}<br>%{{customdata:,.0f}} plots<extra></extra>",
     )
+
+
+def _log_scale(low: float, high: float) -> Chart:
+    """Return a logarithmic axis with as many ticks as it has room for."""
+    steps = (0.5, 0.7, 1, 1.5, 2, 3, 5, 7) if high / low < 20 else (0.1, 0.2, 0.5, 1, 2, 5)
+    decades = (1,) if high / low < 20 else (1, 10, 100, 1000)
+    ticks = sorted({round(step * decade, 1) for step in steps for decade in decades})
+    ends = [float(np.log10(low)), float(np.log10(high))]
+    return {"type": "log", "tickvals": ticks, "range": ends}
 
 
 def _ideal() -> Chart:
@@ -143,6 +153,7 @@ def _targets(targets: "pl.DataFrame") -> Panel:
     """Draw each target's NIS per degree of freedom beside its own band, worst first."""
     rank = np.arange(1, len(targets) + 1)
     nis, low, high = (column(targets, name) for name in ("nis_per_dof", "nis_low", "nis_high"))
+    top = float(np.nanmax(np.append(nis, 2.0)))
     bars = np.stack([low, high, np.full(len(rank), np.nan)], -1).ravel()
     band = {"line": {"color": "#b9c2cd", "width": 3}, "hoverinfo": "skip", "name": "95 % band"}
     data = [charts.line(charts.typed(np.repeat(rank, 3)), charts.short(bars), charts.MUTED) | band]
@@ -155,7 +166,7 @@ def _targets(targets: "pl.DataFrame") -> Panel:
                 "mode": "markers",
                 "name": f"{name} ({len(mine)})",
                 "x": charts.typed(rank[mine]),
-                "y": charts.short(nis[mine]),
+                "y": charts.short(np.maximum(nis[mine], 1.1 * LEAST)),
                 "customdata": [rows[each]["track"] for each in mine],
                 "hovertext": [describe(rows[each]) for each in mine],
                 "hovertemplate": "%{hovertext}<extra></extra>",
@@ -164,7 +175,7 @@ def _targets(targets: "pl.DataFrame") -> Panel:
             }
         )
     x = charts.axis("target, worst first", showgrid=False, rangemode="tozero")
-    y = charts.axis("NIS per degree of freedom", **TICKS)
+    y = charts.axis("NIS per degree of freedom", **_log_scale(LEAST, 1.3 * top))
     layout = charts.layout(xaxis=x, yaxis=y, shapes=[_ideal()], showlegend=True)
     alt = "NIS per degree of freedom of each target beside its own 95 % chi-square band"
     return Panel("nis-targets", {"data": data, "layout": layout}, alt)

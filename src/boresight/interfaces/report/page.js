@@ -41,6 +41,11 @@
   const paint = () => new Promise((done) => { setTimeout(done, 0); });
   const hasWebGl = () => Boolean(document.createElement("canvas").getContext("webgl"));
 
+  const quantile = (values, share) => {
+    const known = values.filter(Number.isFinite).sort();
+    return known.length ? known[Math.floor(share * (known.length - 1))] : 0;
+  };
+
   const drawOne = (series, columns, entry) => {
     const cut = (name) => columns[name].slice(entry.start, entry.start + entry.count);
     const time = cut("time"), used = cut("used"), dof = cut("dof");
@@ -62,14 +67,16 @@
         : { size: 7, color: "#D55E00", symbol: "x-thin-open", line: { width: 1.6 } },
       hovertemplate: "%{x|%H:%M:%S}: %{y:.4g}<extra></extra>" }));
     series.quantities.forEach(([stem, title], row) => {
-      const y = place(row, title, {});
-      const sd = cut(stem + "_sd");
+      const values = cut(stem), sd = cut(stem + "_sd");
+      const known = [...sd.keys()].filter((i) => Number.isFinite(sd[i]));
+      const reach = 1.1 * Math.max(quantile(values.map(Math.abs), 0.99), 3 * quantile(sd, 0.5));
+      const y = place(row, title, { range: [-reach, reach] });
       for (const sign of [-2, 2]) {
-        data.push({ type: "scatter", mode: "lines", x: time, y: sd.map((each) => sign * each),
-          yaxis: y, hoverinfo: "skip", line: { width: 0.8, color: "#9aa5b1" },
+        data.push({ type: "scatter", mode: "lines", x: known.map((i) => time[i]),
+          y: known.map((i) => sign * sd[i]), yaxis: y, hoverinfo: "skip", line: { width: 0.8, color: "#9aa5b1" },
           ...(sign > 0 ? { fill: "tonexty", fillcolor: "rgba(91,102,117,0.16)" } : {}) });
       }
-      data.push(...marks(y, cut(stem), title));
+      data.push(...marks(y, values, title));
     });
     const y = place(rows - 1, "NIS", { type: "log", tickvals: [0.01, 0.1, 1, 10, 100, 1000] });
     data.push(...marks(y, cut("nis").map((each) => Math.max(each, 0.01)), "NIS"));
@@ -145,7 +152,8 @@
     const show = prepare(charts, series);
     listen(show);
     const asked = /^#track=(\d+)$/.exec(location.hash);
-    if (series.index.length) show(asked ? Number(asked[1]) : series.index[0].track);
+    const first = series.index.find((each) => each.count >= 60) ?? series.index[0];
+    if (first) show(asked ? Number(asked[1]) : first.track);
     if (asked) byId("plan").scrollIntoView();
     document.documentElement.dataset.drawn = "true";
   };

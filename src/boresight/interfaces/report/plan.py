@@ -19,6 +19,7 @@ Floats: TypeAlias = NDArray[np.float64]
 NAUTICAL_MILE_KM = 1.852
 RING_STEPS_NM = (0.5, 1, 2, 5, 10, 20, 25, 50, 100)
 MOST_POINTS = 40_000  # plots, and track points, that a browser still moves at once
+HUGE = 0.12  # an ellipse with a longer half axis than this share of the view is left out
 LABELLED = 12  # more names than these hide the picture
 CLASSES = (
     ("consistent", charts.BLUE, "circle"),
@@ -49,17 +50,21 @@ def plan(result: "TrackingResult") -> Plan:
     plots = _plot_positions(result.residuals, tracks)
     plot_step = _step(len(plots[0]))
     heads = tracks.group_by("track", maintain_order=True).last()
-    scale = _exaggeration(heads, float(np.nanmax(np.hypot(east, north))))
+    extent = float(np.nanmax(np.hypot(east, north)))
+    scale = _exaggeration(heads, extent)
+    ellipses, left_out = _ellipses(heads, scale, extent)
     data = [
         _dots(plots[0][::plot_step], plots[1][::plot_step]),
         *_lines(tracks, result.targets),
         _rejected(plots, result.residuals),
-        _ellipses(heads, scale),
+        ellipses,
         *_heads(heads, result.targets),
         charts.line([], [], charts.INK, name="selected", showlegend=False, hoverinfo="skip")
         | {"line": {"color": charts.INK, "width": 3.5}},
     ]
-    return Plan({"data": data, "layout": _layout(east, north)}, _caption(scale, plot_step, tracks))
+    return Plan(
+        {"data": data, "layout": _layout(east, north)}, _caption(scale, plot_step, tracks, left_out)
+    )
 
 
 def _floats(frame: "pl.DataFrame", name: str) -> Floats:
@@ -146,24 +151,30 @@ def _covariance(heads: "pl.DataFrame") -> Floats:
 
 
 def _exaggeration(heads: "pl.DataFrame", extent_km: float) -> int:
-    """Return the factor that makes the median 95 % ellipse about 2 % of the view."""
+    """Return the factor that makes the median 95 % ellipse about 1.5 % of the view."""
     major = 2.448 * np.sqrt(np.nanmedian(np.trace(_covariance(heads), axis1=1, axis2=2)))
-    wanted = 0.02 * extent_km / major if major > 0 else 1.0
-    return max((step for step in (1, 2, 5, 10, 20, 50, 100) if step <= wanted), default=1)
+    wanted = 0.015 * extent_km / major if major > 0 else 1.0
+    return max((step for step in (1, 2, 5, 10, 20, 50) if step <= wanted), default=1)
 
 
-def _ellipses(heads: "pl.DataFrame", scale: int) -> Chart:
-    """Draw 95 % ellipses (2.448 sd in two dimensions) at the last point of each track."""
+def _ellipses(heads: "pl.DataFrame", scale: int, extent_km: float) -> tuple[Chart, int]:
+    """Draw 95 % ellipses (2.448 sd in two dimensions) at the last point of each track.
+
+    Those of tracks that have only just begun would cover the view: they are counted instead.
+    """
     angle = np.linspace(0, 2 * np.pi, 33)
     circle = np.append(np.stack([np.cos(angle), np.sin(angle)]), np.full((2, 1), np.nan), axis=1)
     values, vectors = np.linalg.eigh(np.nan_to_num(_covariance(heads)))
     axes = vectors * (2.448 * scale * np.sqrt(np.maximum(values, 0.0)))[:, None, :]
+    is_huge = np.max(np.abs(axes), axis=(1, 2)) > HUGE * extent_km
+    axes[is_huge] = np.nan
     centre = np.stack([_floats(heads, "east_m"), _floats(heads, "north_m")], -1) / 1e3
     x, y = np.moveaxis(axes @ circle + centre[:, :, None], 1, 0)
-    name = "95 % ellipse" + (f", drawn {scale} times its size" if scale > 1 else "")
+    name = "95 % ellipse" + (f" × {scale}" if scale > 1 else "")
     style = {"line": {"color": charts.INK, "width": 1}, "type": "scattergl", "hoverinfo": "skip"}
     packed = charts.short(x.ravel(), 16), charts.short(y.ravel(), 16)
-    return charts.line(*packed, charts.INK, name=name, connectgaps=False) | style
+    trace = charts.line(*packed, charts.INK, name=name, connectgaps=False) | style
+    return trace, int(is_huge.sum())
 
 
 def _heads(heads: "pl.DataFrame", targets: "pl.DataFrame") -> list[Chart]:
@@ -254,9 +265,11 @@ def _ring_name(radius_nm: float) -> Chart:
     }
 
 
-def _caption(scale: int, plot_step: int, tracks: "pl.DataFrame") -> str:
+def _caption(scale: int, plot_step: int, tracks: "pl.DataFrame", left_out: int) -> str:
     said = ["Plots, tracks and, at the end of each track, the 95 % ellipse of its position"]
     said.append(f" drawn {scale} times its size." if scale > 1 else " at its true size.")
+    if left_out:
+        said.append(f" {left_out} that would cover the view are left out.")
     if plot_step > 1:
         said.append(f" One plot in {plot_step} is drawn.")
     if (step := _step(len(tracks))) > 1:

@@ -15,7 +15,10 @@ Floats: TypeAlias = NDArray[np.float64]
 
 ROWS = 61  # odd: zero is the middle of a cell
 MARGIN_SDS = 4.0
-FEWEST = 8  # a mean of fewer residuals says nothing
+FEWEST = 8  # the middle of fewer residuals says nothing
+MAD_TO_SD = 1.4826  # of a normal law
+MEDIAN_COST = 1.2533  # standard error of a median over that of a mean, of a normal law
+NORMAL_95 = 1.96
 
 
 class Quantity(NamedTuple):
@@ -105,32 +108,49 @@ def _panel(used: "pl.DataFrame", quantity: Quantity, against: Against) -> Panel:
     reach = MARGIN_SDS * float(np.nanmedian(sd))
     count, centre = len(bounds) - 1, (bounds[1:] + bounds[:-1]) / 2
     cell = cells(x, bounds)
-    number, mean, error, spread = _statistics(cell, residual, sd, count)
+    found = _centres(cell, residual, sd, count)
     data = [
         _density(x, residual, bounds, reach),
-        *(_spread(centre, sign * spread) for sign in (-2, 2)),
-        _mean(centre, mean, error, number, quantity),
+        *(_spread(centre, sign * found.sd) for sign in (-2, 2)),
+        _median(centre, found, quantity),
     ]
     layout = _layout(quantity, against, bounds, reach)
-    alt = f"{quantity.words} residual against {against.words}: density, mean and twice the sd"
+    alt = f"{quantity.words} residual against {against.words}: density, median and twice the sd"
     name = f"residual-{quantity.stem}-{against.column.split('_')[0]}"
     return Panel(name, {"data": data, "layout": layout}, alt)
 
 
-def _statistics(
-    cell: NDArray[np.intp], residual: Floats, sd: Floats, count: int
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return for each cell number, mean, half width of the mean's 95 % interval, the filter's sd.
+def robust_sd(values: Floats) -> float:
+    """Return the standard deviation by the median absolute deviation: outliers do not sway it."""
+    return float(MAD_TO_SD * np.median(np.abs(values - np.median(values))))
+
+
+class Centre(NamedTuple):
+    """Of each cell (cells,): median, half its 95 % interval, the filter's median sd, plots."""
+
+    median: Floats
+    error: Floats
+    sd: Floats
+    number: Floats
+
+
+def _centres(cell: NDArray[np.intp], residual: Floats, sd: Floats, count: int) -> Centre:
+    """Return where the residuals of each cell lie; NaN where they are too few.
 
     The interval takes residuals as independent, which those of one turning target are not.
     """
-    number = np.bincount(cell, minlength=count).astype(float)
-    enough = np.where(number >= FEWEST, number, np.nan)
-    mean = np.bincount(cell, residual, count) / enough
-    square = np.bincount(cell, residual**2, count) / enough
-    error = 1.96 * np.sqrt(np.maximum(square - mean**2, 0.0) / enough)
-    spread = np.sqrt(np.bincount(cell, np.nan_to_num(sd) ** 2, count) / enough)
-    return number, mean, error, spread
+    order = np.argsort(cell, kind="stable")
+    cuts = np.searchsorted(cell[order], np.arange(1, count))
+    parts = zip(np.split(residual[order], cuts), np.split(sd[order], cuts), strict=True)
+    return Centre(*np.array([_centre(*part) for part in parts]).T)
+
+
+def _centre(residual: Floats, sd: Floats) -> tuple[float, float, float, float]:
+    number = len(residual)
+    if number < FEWEST:
+        return np.nan, np.nan, np.nan, number
+    error = NORMAL_95 * MEDIAN_COST * robust_sd(residual) / np.sqrt(number)
+    return float(np.median(residual)), float(error), float(np.nanmedian(sd)), number
 
 
 def _density(x: Floats, residual: Floats, bounds: Floats, reach: float) -> Chart:
@@ -156,22 +176,23 @@ def _spread(x: Floats, y: Floats) -> Chart:
     return charts.line(charts.typed(x, "f8"), charts.short(y), charts.INK, hoverinfo="skip") | style
 
 
-def _mean(x: Floats, mean: Floats, error: Floats, number: Floats, quantity: Quantity) -> Chart:
+def _median(x: Floats, found: Centre, quantity: Quantity) -> Chart:
+    error = charts.short(found.error)
     ends = f"%{{y:.3~g}} ± %{{customdata[0]:.2~g}} {quantity.unit}"
     return charts.line(
         charts.typed(x, "f8"),
-        charts.short(mean),
+        charts.short(found.median),
         charts.ORANGE,
         mode="lines+markers",
         marker={"size": 4, "color": charts.ORANGE},
         error_y={
-            "array": charts.short(error),
+            "array": error,
             "color": charts.ORANGE,
             "thickness": 1.1,
             "width": 0,
         },
-        customdata=charts.short(np.stack([np.nan_to_num(error), number], -1), 22),
-        hovertemplate=f"mean {ends}<br>%{{customdata[1]:,.0f}} plots<extra></extra>",
+        customdata=charts.short(np.stack([np.nan_to_num(found.error), found.number], -1), 22),
+        hovertemplate=f"median {ends}<br>%{{customdata[1]:,.0f}} plots<extra></extra>",
     )
 
 

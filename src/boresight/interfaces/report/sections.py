@@ -9,7 +9,7 @@ from boresight.interfaces.report import tables
 from boresight.interfaces.report.residuals import QUANTITIES, Panel, measured
 from boresight.interfaces.report.target import Series
 from boresight.interfaces.report.verdict import Sentence, sentences
-from boresight.interfaces.report.words import clock, figure, panel, percent
+from boresight.interfaces.report.words import NIS_WORDS, clock, figure, panel, percent
 
 if TYPE_CHECKING:
     from boresight.tracking.result import Comparison, TrackingResult
@@ -21,9 +21,10 @@ NIS_KEY = """<ul class="key" aria-label="Key of the three charts">
 <li><span class="swatch band"></span>95 % chi-square band of the mean</li></ul>"""
 KEY = """<ul class="key" aria-label="Key of the nine charts">
 <li><span class="swatch density"></span>plots in the cell, few to many (logarithmic)</li>
-<li><span class="swatch mean"></span>mean with its 95 % interval</li>
+<li><span class="swatch mean"></span>median with its 95 % interval</li>
 <li><span class="swatch spread"></span>twice the filter's own sd</li></ul>"""
 
+NIS_ORDER = ("straight_second_half", "straight", "all")
 LAW_CAPTION = (
     "Share of plots whose NIS lies above a value, inside the gate. Above the dotted line: "
     "larger errors than the noise model allows."
@@ -83,18 +84,12 @@ def _section(name: str, title: str, html: str) -> str:
 def _header(parts: Parts) -> str:
     result, inspection = parts.result, parts.inspection
     title = escape(str(inspection.get("file", "Tracked recording")))
-    nis = next(
-        (
-            result.nis[name]
-            for name in ("straight_second_half", "straight", "all")
-            if name in result.nis
-        ),
-        {},
-    )
+    name = next((each for each in NIS_ORDER if result.nis.get(each, {}).get("scans")), "all")
+    nis = result.nis.get(name, {})
     tiles = (
         ("plots", figure(result.plots), f"{percent(result.used, result.plots)} used"),
         ("tracks", figure(len(result.targets)), f"filter {escape(result.filter)}"),
-        ("NIS per degree of freedom", f"{nis.get('mean', float('nan')):.2f}", "1 is consistent"),
+        ("NIS per degree of freedom", f"{nis.get('mean', float('nan')):.2f}", NIS_WORDS[name]),
         ("time", *_span(result)),
     )
     cells = "".join(
@@ -164,7 +159,7 @@ def _residuals(parts: Parts) -> str:
         "<p>A residual is measured minus predicted, for plots inside the gate. It shows noise and "
         "what the motion model misses. An error common to all plots of a target, such as a "
         "constant range or azimuth bias, moves the track with it and does not appear here. The "
-        "interval of a mean takes residuals as independent; successive ones in a turn are not.</p>"
+        "interval of a median takes residuals as independent; those of one turn are not.</p>"
     )
     missing = [each.words for each in QUANTITIES if each not in measured(used)]
     if missing:

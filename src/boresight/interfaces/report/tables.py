@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from boresight.interfaces.report.plan import CLASSES, classes
 from boresight.interfaces.report.words import (
+    NIS_WORDS,
     Cell,
     clock,
     figure,
@@ -30,42 +31,42 @@ def targets(result: "TrackingResult") -> str:
     """Every target, worst first, with a meter of its NIS beside its own band."""
     rows = result.targets.to_dicts()
     kinds = classes(result.targets).tolist()
-    with_scatter = any(row["fixed"] for row in rows)
-    heads = ["track", "address", "mode A", "identification", "from", "to", "plots", "used"]
+    heads = ["track", "address", "mode A", "identification", "from", "to", "plots"]
     heads += ["rejected", "restarts", "NIS/dof", "95 % band", "0.1 – 1 – 10", "verdict"]
-    heads += ["range sd, m", "azimuth sd, °"] if with_scatter else []
-    cells = [
-        _target(row, kind, with_scatter=with_scatter) for row, kind in zip(rows, kinds, strict=True)
-    ]
+    cells = [_target(row, kind) for row, kind in zip(rows, kinds, strict=True)]
     marks = [f' data-track="{row["track"]}"' for row in rows]
     caption = f"{len(rows):,} targets, worst first"
     return table(caption, heads, cells, name="target-table", sortable=True, row_attributes=marks)
 
 
-def _target(row: dict[str, Any], kind: int, *, with_scatter: bool) -> list[Cell]:
+def _target(row: dict[str, Any], kind: int) -> list[Cell]:
     cells = [number_cell(row["track"])]
     cells += [text_cell(row[name]) for name in ("address", "mode_a", "aircraft_id")]
     cells += [
         Cell(clock(row[name]), f"{row[name]:.3f}", is_figure=True) for name in ("first_s", "last_s")
     ]
-    cells += [number_cell(row[name]) for name in ("plots", "used", "rejected", "restarts")]
+    cells += [number_cell(row[name]) for name in ("plots", "rejected", "restarts")]
     band = f"{figure(row['nis_low'], 3)} – {figure(row['nis_high'], 3)}"
     cells += [
         number_cell(row["nis_per_dof"], 3),
         Cell(band, is_figure=True),
         Cell(_meter(row, kind)),
     ]
-    cells.append(_verdict(row, kind))
-    if with_scatter:
-        cells += [number_cell(row[name], 3) for name in ("range_sd_m", "azimuth_sd_deg")]
-    return cells
+    return [*cells, _verdict(row, kind)]
 
 
 def _verdict(row: dict[str, Any], kind: int) -> Cell:
     name, color, _ = CLASSES[kind]
-    said = row["verdict"] or name
+    said = (row["verdict"] or name) + _scatter(row)
     glyph = f'<span style="color:{color}" aria-hidden="true">{GLYPHS[kind]}</span>'
     return Cell(f"{glyph} {escape(str(said))}", str(said))
+
+
+def _scatter(row: dict[str, Any]) -> str:
+    """Say how a target that does not move scatters."""
+    if not row.get("fixed"):
+        return ""
+    return f"; fixed, sd {figure(row['range_sd_m'], 3)} m, {figure(row['azimuth_sd_deg'], 3)}°"
 
 
 def _place(value: float | None) -> float:
@@ -104,11 +105,8 @@ def _filter(each: "Comparison") -> list[Cell]:
 def nis(result: "TrackingResult") -> str:
     """NIS per degree of freedom for each selection of scans."""
     heads = ["scans", "mean", "median", "median of chi-square", "degrees of freedom", "plots"]
-    words = {"straight": "straight flight", "straight_second_half": "straight, second half"}
-    words |= {"straight_first_half": "straight, first half"}
-    words |= {"all": "all"}
     rows = [
-        [text_cell(words.get(name, name.replace("_", " ")))]
+        [text_cell(NIS_WORDS.get(name, name.replace("_", " ")))]
         + [number_cell(entry.get(key), 3) for key in ("mean", "median")]
         + [number_cell(_chi_square_median(entry), 3)]
         + [Cell(f"{entry.get(key, 0):,.0f}", is_figure=True) for key in ("dof", "scans")]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from boresight.interfaces.report.plan import classes, title
-from boresight.interfaces.report.residuals import column, measured
+from boresight.interfaces.report.residuals import column, measured, robust_sd
 from boresight.interfaces.report.words import figure, percent
 
 if TYPE_CHECKING:
@@ -132,7 +132,8 @@ def _scatter(result: "TrackingResult") -> Iterator[Sentence]:
     parts, ratios = [], []
     for quantity in measured(used):
         residual, sd = (column(used, name) for name in quantity.columns)
-        measured_sd, stated = float(np.nanstd(residual)), float(np.sqrt(np.nanmean(sd**2)))
+        measured_sd = robust_sd(residual[np.isfinite(residual)])
+        stated = float(np.nanmedian(sd))
         parts.append(
             f"{quantity.words} {_sized(measured_sd, quantity.unit)} "
             f"(the filter expects {_sized(stated, quantity.unit)})"
@@ -140,7 +141,7 @@ def _scatter(result: "TrackingResult") -> Iterator[Sentence]:
         ratios.append(measured_sd / stated if stated else math.nan)
     if parts:
         is_good = all(1 / SCATTER_OFF < ratio < SCATTER_OFF for ratio in ratios)
-        html = f"Residuals of the plots used scatter by {'; '.join(parts)}."
+        html = f"Residuals scatter by {'; '.join(parts)}: medians, which outliers do not sway."
         yield Sentence("good" if is_good else "attention", html, "residuals")
 
 
@@ -155,8 +156,8 @@ def _use(result: "TrackingResult") -> Iterator[Sentence]:
         "good" if share >= ENOUGH_USED else "attention",
         f"{figure(result.used)} of {figure(result.plots)} plots "
         f"({percent(result.used, result.plots)}) belong to {figure(len(result.targets))} tracks; "
-        f"{figure(result.rejected)} lay outside their track's gate; the table of unused plots "
-        f"counts {figure(unused)} with the reason of each.",
+        f"{figure(result.rejected)} lay outside their track's gate. Why {figure(unused)} were not "
+        "used is listed.",
         "skipped",
     )
 
@@ -178,12 +179,17 @@ def _fixed(result: "TrackingResult") -> Iterator[Sentence]:
     for row in result.targets.filter(result.targets["fixed"].fill_null(value=False)).to_dicts():
         yield Sentence(
             "note",
-            f"{escape(title(row))} does not move: its {figure(row['plots'])} plots scatter by "
-            f"{figure(row['range_sd_m'], 3)} m in range and {figure(row['azimuth_sd_deg'], 3)}° in "
+            f"{escape(_full_title(row))} does not move: its {figure(row['plots'])} plots scatter "
+            f"by {figure(row['range_sd_m'], 3)} m in range and {figure(row['azimuth_sd_deg'], 3)}° in "
             "azimuth. That is the sensor's own noise on one strong reply, and less than an "
             "aircraft's.",
             "targets",
         )
+
+
+def _full_title(row: dict[str, Any]) -> str:
+    name, address = title(row), row["address"]
+    return f"{address} ({name})" if address and address != name else name
 
 
 def _damage(inspection: dict[str, Any]) -> Iterator[Sentence]:

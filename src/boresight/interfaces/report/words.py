@@ -16,6 +16,14 @@ UNITS = {
 }
 
 
+NIS_WORDS = {
+    "all": "all scans",
+    "straight": "straight flight",
+    "straight_first_half": "straight flight, first half",
+    "straight_second_half": "straight flight, second half",
+}
+
+
 class Cell(NamedTuple):
     """One cell of a table: HTML, the key it sorts by, and whether it is a figure."""
 
