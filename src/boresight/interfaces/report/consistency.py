@@ -42,6 +42,16 @@ def bounds_of_mean(dof: Floats) -> tuple[Floats, Floats]:
     return chdtri(safe, 0.975) / safe, chdtri(safe, 0.025) / safe
 
 
+def chi_square_median(nis: dict[str, float]) -> float:
+    """Return the median NIS per degree of freedom of a consistent filter with as many."""
+    from scipy.special import chdtri
+
+    if not nis.get("scans"):
+        return float("nan")
+    dof = nis["dof"] / nis["scans"]
+    return float(chdtri(dof, 0.5)) / dof
+
+
 def _groups(used: "pl.DataFrame") -> list[tuple[str, str, "pl.DataFrame"]]:
     groups = [("all scans", charts.BLUE, used)]
     if used["straight"].count() > 0:

@@ -20,6 +20,7 @@ NAUTICAL_MILE_KM = 1.852
 RING_STEPS_NM = (0.5, 1, 2, 5, 10, 20, 25, 50, 100)
 MOST_POINTS = 40_000  # plots, and track points, that a browser still moves at once
 HUGE = 0.12  # an ellipse with a longer half axis than this share of the view is left out
+APART = 0.12  # of the view's half width: nearer names would lie on one another
 LABELLED = 12  # more names than these hide the picture
 CLASSES = (
     ("consistent", charts.BLUE, "circle"),
@@ -180,12 +181,13 @@ def _ellipses(heads: "pl.DataFrame", scale: int, extent_km: float) -> tuple[Char
 def _heads(heads: "pl.DataFrame", targets: "pl.DataFrame") -> list[Chart]:
     """Mark where each track was last, in its class's colour and shape; name the worst."""
     order = {track: index for index, track in enumerate(heads["track"].to_list())}
+    named = _named(heads, [order.get(track) for track in targets["track"].to_list()])
     kinds, charts_out = classes(targets), []
     rows = targets.to_dicts()
     for index, (name, color, symbol) in enumerate(CLASSES):
         mine = [rank for rank in np.flatnonzero(kinds == index) if rows[rank]["track"] in order]
         at = [order[rows[rank]["track"]] for rank in mine]
-        names = [escape(title(rows[rank])) if rank < LABELLED else "" for rank in mine]
+        names = [escape(title(rows[rank])) if rank in named else "" for rank in mine]
         trace = {
             "type": "scatter",
             "mode": "markers+text",
@@ -204,6 +206,20 @@ def _heads(heads: "pl.DataFrame", targets: "pl.DataFrame") -> list[Chart]:
         }
         charts_out.append(trace)
     return charts_out
+
+
+def _named(heads: "pl.DataFrame", order: list[int | None]) -> set[int]:
+    """Return the ranks of the worst targets whose names do not lie on one another."""
+    places = np.stack([_floats(heads, "east_m"), _floats(heads, "north_m")], -1)
+    apart = APART * float(np.nanmax(np.abs(places), initial=1.0))
+    taken: dict[int, Floats] = {}
+    for rank, index in enumerate(order):
+        if index is None or len(taken) == LABELLED:
+            continue
+        here = places[index]
+        if all(np.hypot(*(here - there)) > apart for there in taken.values()):
+            taken[rank] = here
+    return set(taken)
 
 
 def title(row: dict[str, Any]) -> str:
@@ -275,7 +291,7 @@ def _caption(scale: int, plot_step: int, tracks: "pl.DataFrame", left_out: int) 
     if (step := _step(len(tracks))) > 1:
         said.append(f" Tracks are drawn through one point in {step}.")
     said.append(
-        f" Rings are ground range in nautical miles. Names mark the {LABELLED} worst targets."
-        " Choose a track to see its residuals."
+        " Rings are ground range in nautical miles. Names mark the worst targets, where there is"
+        " room. Choose a track to see its residuals."
     )
     return "".join(said)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from boresight.interfaces.report.consistency import chi_square_median
 from boresight.interfaces.report.plan import CLASSES, classes
 from boresight.interfaces.report.words import (
     NIS_WORDS,
@@ -108,20 +109,11 @@ def nis(result: "TrackingResult") -> str:
     rows = [
         [text_cell(NIS_WORDS.get(name, name.replace("_", " ")))]
         + [number_cell(entry.get(key), 3) for key in ("mean", "median")]
-        + [number_cell(_chi_square_median(entry), 3)]
+        + [number_cell(chi_square_median(entry), 3)]
         + [Cell(f"{entry.get(key, 0):,.0f}", is_figure=True) for key in ("dof", "scans")]
         for name, entry in result.nis.items()
     ]
     return table("NIS per degree of freedom; 1 is consistent", heads, rows)
-
-
-def _chi_square_median(entry: dict[str, float]) -> float | None:
-    from scipy.special import chdtri
-
-    if not entry.get("scans"):
-        return None
-    dof = entry["dof"] / entry["scans"]
-    return float(chdtri(dof, 0.5)) / dof
 
 
 def skipped(result: "TrackingResult") -> str:

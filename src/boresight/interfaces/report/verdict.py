@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from boresight.interfaces.report.consistency import chi_square_median
 from boresight.interfaces.report.plan import classes, title
 from boresight.interfaces.report.residuals import column, measured, robust_sd
 from boresight.interfaces.report.words import figure, percent
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 NIS_LOW, NIS_HIGH = 0.8, 1.25  # beyond these the stated sd is off by more than 12 %
 ENOUGH_USED = 0.95
 SCATTER_OFF = 1.15
+TAIL = 0.7  # of chi-square's median; a lower one means outliers
 
 
 class Sentence(NamedTuple):
@@ -93,11 +95,11 @@ def _straight(result: "TrackingResult") -> Iterator[Sentence]:
     if not _is_known(nis):
         yield Sentence("note", "No plot was compared with a prediction.", "consistency")
         return
-    mean = nis["mean"]
+    mean, tail = nis["mean"], _tail(nis)
     yield Sentence(
-        "good" if NIS_LOW <= mean <= NIS_HIGH else "attention",
+        "good" if NIS_LOW <= mean <= NIS_HIGH and not tail else "attention",
         f"{where}NIS per degree of freedom is {mean:.2f} on average (median "
-        f"{nis['median']:.2f}; {nis['scans']:,.0f} plots): {_meaning(mean)}.",
+        f"{nis['median']:.2f}; {nis['scans']:,.0f} plots): {_meaning(mean)}{tail}.",
         "consistency",
     )
 
@@ -112,7 +114,18 @@ def _meaning(mean: float) -> str:
         return f"errors are {ratio:.2f} times what the filter states, it is too confident"
     if mean < NIS_LOW:
         return f"errors are {ratio:.2f} times what the filter states, it is too cautious"
-    return f"errors are {ratio:.2f} times what the filter states, near enough to be trusted"
+    return f"errors are {ratio:.2f} times what the filter states"
+
+
+def _tail(nis: dict[str, float]) -> str:
+    """Say so where a few large errors hide behind a mean that looks right."""
+    expected = chi_square_median(nis)
+    if nis["median"] > TAIL * expected:
+        return ""
+    return (
+        f". But the median of a chi-square law would be {expected:.2f}: most errors are smaller, "
+        "and a few much larger, than stated"
+    )
 
 
 def _turns(result: "TrackingResult") -> Iterator[Sentence]:
@@ -179,9 +192,9 @@ def _fixed(result: "TrackingResult") -> Iterator[Sentence]:
     for row in result.targets.filter(result.targets["fixed"].fill_null(value=False)).to_dicts():
         yield Sentence(
             "note",
-            f"{escape(_full_title(row))} does not move: its {figure(row['plots'])} plots scatter "
-            f"by {figure(row['range_sd_m'], 3)} m in range and {figure(row['azimuth_sd_deg'], 3)}° in "
-            "azimuth. That is the sensor's own noise on one strong reply, and less than an "
+            f"{escape(_full_title(row))} does not move: over {figure(row['plots'])} plots its sd "
+            f"is {figure(row['range_sd_m'], 3)} m in range and {figure(row['azimuth_sd_deg'], 3)}° "
+            "in azimuth. That is the sensor's own noise on one strong reply, and less than an "
             "aircraft's.",
             "targets",
         )

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import partial
 from html import escape
 from typing import Any, NamedTuple
 
@@ -86,11 +87,13 @@ def table(
     row_attributes: Sequence[str] = (),
 ) -> str:
     """Render a table; heads of a sortable one are buttons, and work where scripts do."""
-    body = []
+    body, kinds = [], []
     for index, row in enumerate(rows):
+        kinds = [cell.is_figure for cell in row]
         attributes = row_attributes[index] if row_attributes else ""
         body.append(f"<tr{attributes}>{''.join(map(_cell, row))}</tr>")
-    cells = "".join(_head(head, sortable=sortable) for head in heads)
+    kinds = kinds or [False] * len(heads)
+    cells = "".join(map(partial(_head, sortable=sortable), heads, kinds))
     marks = (f' id="{name}"' if name else "") + (' class="sortable"' if sortable else "")
     return (
         f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">'
@@ -99,9 +102,10 @@ def table(
     )
 
 
-def _head(head: str, *, sortable: bool) -> str:
+def _head(head: str, is_figure: bool, *, sortable: bool) -> str:  # noqa: FBT001 - mapped over
     inside = f'<button type="button">{head}</button>' if sortable else head
-    return f'<th scope="col">{inside}</th>'
+    kind = ' class="n"' if is_figure else ""
+    return f'<th scope="col"{kind}>{inside}</th>'
 
 
 def _cell(cell: Cell) -> str:
