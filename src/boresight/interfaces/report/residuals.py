@@ -16,7 +16,6 @@ Floats: TypeAlias = NDArray[np.float64]
 ROWS = 61  # odd: zero is the middle of a cell
 MARGIN_SDS = 4.0
 FEWEST = 8  # the middle of fewer residuals says nothing
-MAD_TO_SD = 1.4826  # of a normal law
 MEDIAN_COST = 1.2533  # standard error of a median over that of a mean, of a normal law
 NORMAL_95 = 1.96
 
@@ -121,8 +120,12 @@ def _panel(used: "pl.DataFrame", quantity: Quantity, against: Against) -> Panel:
 
 
 def robust_sd(values: Floats) -> float:
-    """Return the standard deviation by the median absolute deviation: outliers do not sway it."""
-    return float(MAD_TO_SD * np.median(np.abs(values - np.median(values))))
+    """Return half the width of the middle 68.3 %: the sd of a normal law, blind to outliers.
+
+    The median absolute deviation would fail on heights: most are repeated to the quantum.
+    """
+    low, high = np.quantile(values, [0.158655, 0.841345])
+    return float(high - low) / 2
 
 
 class Centre(NamedTuple):

@@ -133,8 +133,8 @@ def _turns(result: "TrackingResult") -> Iterator[Sentence]:
     if _is_known(every) and _is_known(straight) and every["mean"] > 1.1 * straight["mean"]:
         yield Sentence(
             "attention",
-            f"Over all scans, turns included, it is {every['mean']:.2f} (median "
-            f"{every['median']:.2f}): a filter that assumes constant velocity lags behind a turn, "
+            f"Over all scans, turns included, NIS per degree of freedom is {every['mean']:.2f} "
+            f"(median {every['median']:.2f}): a filter that assumes constant velocity lags behind a turn, "
             "and its covariance does not show it.",
             "consistency",
         )
@@ -154,7 +154,10 @@ def _scatter(result: "TrackingResult") -> Iterator[Sentence]:
         ratios.append(measured_sd / stated if stated else math.nan)
     if parts:
         is_good = all(1 / SCATTER_OFF < ratio < SCATTER_OFF for ratio in ratios)
-        html = f"Residuals scatter by {'; '.join(parts)}: medians, which outliers do not sway."
+        html = (
+            f"Residuals scatter by {'; '.join(parts)}. Scatter is half the width of the middle "
+            "68 %, which outliers do not sway."
+        )
         yield Sentence("good" if is_good else "attention", html, "residuals")
 
 
