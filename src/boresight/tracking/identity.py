@@ -18,6 +18,7 @@ FASTEST_MPS = 600.0  # of anything with a transponder: continuity of a shared co
 SLACK_M = 2_000.0  # plus what noise may add
 SHORTEST_GAP_S = 60.0  # a silence this long, or of this many scans, ends a track
 GAP_SCANS = 8
+FEWEST = 3  # plots that make a second aircraft of the same identity
 DUPLICATE_SCANS = 0.125  # two plots of one identity closer than this are one reply seen twice
 
 MEANINGS = {
@@ -26,6 +27,7 @@ MEANINGS = {
     "test": "a test target or a simulated one",
     "no identity": "neither a 24-bit address nor a Mode A code",
     "garbled code": "the Mode A code is marked garbled or not validated, and there is no address",
+    "jump": "too far from the other plots of its identity for anything that flies",
     "duplicate": "a second plot of the same identity in the same instant (split or reflected)",
 }
 
@@ -58,6 +60,7 @@ def sort_by_identity(plots: "pl.DataFrame") -> Sorted:
     position = _positions(plots)
     rows = _without_duplicates(rows, time, keys, position, scan, skipped)
     thread = _threads(rows, time, keys, position)
+    rows, thread = _without_jumps(rows, thread, keys, skipped)
     order = np.lexsort((time[rows], thread, keys[rows]))
     rows, thread = rows[order], thread[order]
     track = _by_first_appearance(_cut(time[rows], keys[rows], thread, scan), time[rows])
@@ -133,6 +136,17 @@ def _threads(rows: Array, time: Array, keys: Array, position: Array) -> Array:
         if np.any(np.abs(np.diff(position[part])) > reach):
             thread[start:stop] = _follow(position[part], time[part])
     return thread
+
+
+def _without_jumps(rows: Array, thread: Array, keys: Array, skipped: Array) -> tuple[Array, Array]:
+    """A thread of one or two plots beside a longer one is no aircraft."""
+    pair = keys[rows] * (thread.max(initial=0) + 1) + thread
+    _, which, count = np.unique(pair, return_inverse=True, return_counts=True)
+    shared = np.zeros(keys.max(initial=0) + 1, dtype=bool)
+    shared[keys[rows[thread > 0]]] = True
+    jump = shared[keys[rows]] & (count[which] < FEWEST)
+    skipped[rows[jump]] = "jump"
+    return rows[~jump], thread[~jump]
 
 
 def _runs(keys: Array) -> list[tuple[int, int]]:

@@ -54,16 +54,15 @@ def cubic_residuals(time: Array, values: Array) -> Array:
         values: (w, WINDOW).
 
     Returns:
-        (w, WINDOW), scaled so that white noise keeps its variance (four parameters were fitted).
+        (w, WINDOW), each scaled by its leverage so that white noise keeps its variance.
     """
     t = time - time.mean(axis=1, keepdims=True)
     t = t / np.abs(t).max(axis=1, keepdims=True)
     basis = np.stack([t**i for i in range(4)], axis=-1)
-    coefficients = np.linalg.solve(
-        np.einsum("wij,wik->wjk", basis, basis), np.einsum("wij,wi->wj", basis, values)[..., None]
-    )
-    fitted = np.einsum("wij,wj->wi", basis, coefficients[..., 0])
-    return (values - fitted) * np.sqrt(WINDOW / (WINDOW - 4))
+    Q, _ = np.linalg.qr(basis)
+    fitted = np.einsum("wij,wkj,wk->wi", Q, Q, values)
+    leverage = np.einsum("wij,wij->wi", Q, Q)
+    return (values - fitted) / np.sqrt(1.0 - leverage)
 
 
 def measure(flights: Flights, scan_s: float) -> Noise:

@@ -154,7 +154,8 @@ def target_table(
         ["too few plots", "too confident", "too cautious"],
         default="consistent",
     )
-    fixed, range_sd, azimuth_sd = _fixed(flights, segments)
+    monitor = column(plots, "fixed_transponder", default=False).astype(bool)[found.row]
+    fixed, range_sd, azimuth_sd = _fixed(flights, segments, monitor)
     table = pl.DataFrame(
         {
             "track": flights.track[firsts],
@@ -195,16 +196,18 @@ def _first_known(plots: "pl.DataFrame", name: str, row: Array, segments: Array) 
     return pl.Series(name, firsts, dtype=pl.String)
 
 
-def _fixed(flights: Flights, segments: Array) -> tuple[Array, Array, Array]:
-    """Targets that never moved, and the scatter of their plots: the radar's noise seen bare."""
+def _fixed(flights: Flights, segments: Array, monitor: Array) -> tuple[Array, Array, Array]:
+    """Targets that never moved, and the scatter of their plots: the radar's noise seen bare.
+
+    A target is fixed if the radar says so (field monitor), or if its plots stay where they are.
+    """
     n = len(segments)
     fixed = np.zeros(n, dtype=bool)
     range_sd, azimuth_sd = np.full(n, np.nan), np.full(n, np.nan)
     for i, (a, b) in enumerate(segments.tolist()):
         distance, azimuth = flights.z[a:b, 0], np.degrees(np.unwrap(flights.z[a:b, 1]))
-        if b - a < FIXED_PLOTS or np.ptp(distance) > FIXED_RANGE_M:
-            continue
-        if np.ptp(azimuth) < FIXED_AZIMUTH_DEG:
+        still = np.ptp(distance) < FIXED_RANGE_M and np.ptp(azimuth) < FIXED_AZIMUTH_DEG
+        if monitor[a:b].all() or (still and b - a >= FIXED_PLOTS):
             fixed[i] = True
             range_sd[i], azimuth_sd[i] = distance.std(ddof=1), azimuth.std(ddof=1)
     return fixed, range_sd, azimuth_sd
