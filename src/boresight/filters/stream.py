@@ -114,6 +114,11 @@ class Stream:
                 plot, self.recursion.motion, self.recursion.sensor, speed_mps=speed_mps
             )
         states = start_states(prior, self._lanes)
+        if states.data.size != self._state_numbers:
+            raise UsageError(
+                f"a start with mean {np.shape(prior.mean)}",
+                why=f"the motion has the states {', '.join(self.recursion.motion.names)}",
+            )
         buffer = self._buffer_type()
         np.frombuffer(buffer)[: self._state_numbers] = states.data.ravel()
         return StreamState(self, buffer)

@@ -116,7 +116,7 @@ class Kernel:
         arrays = (states.data, new, *packed, *outputs)
         addresses = [array.ctypes.data for array in arrays]
         chunks = self.code.chunks(states.lanes)
-        parts = min(threads, chunks)
+        parts = max(1, min(threads, chunks))
         cuts = [i * chunks // parts for i in range(parts + 1)]
         call, pack = self.code.call, self.code.frame.pack
 

@@ -148,7 +148,7 @@ class ConstantAcceleration:
         q = self.jerk_mps3 * self.jerk_mps3
         if self.discretisation == "discrete":
             gain = [dt**3 / 2, dt**2, dt]
-            block = [[q * a * b for b in gain] for a in gain]
+            block = [[q * (a * b) for b in gain] for a in gain]
         else:
             block = [
                 [q * dt**5 / 20, q * dt**4 / 8, q * dt**3 / 6],

@@ -1,0 +1,158 @@
+"""Who must obey the laws: every filter, motion and component, in the worlds they are made for."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from boresight import catalogue
+from boresight.maths.frames import Site
+from boresight.models.motion import (
+    ConstantAcceleration,
+    ConstantVelocity,
+    CoordinatedTurn,
+    SphericalUnitRate,
+    Static,
+    WithHeightOffset,
+)
+from boresight.models.sensors import Pose, PositionSensor, Radar
+
+km, deg, mrad = 1e3, np.pi / 180, 1e-3
+SITE = Site(latitude_deg=51.1, longitude_deg=1.2, height_m=45.0)
+PLANE = ConstantVelocity(accel_mps2=2.0, dims=2)
+SPACE = ConstantVelocity(accel_mps2=2.0, dims=3)
+
+
+def turned(angle, dims=3):
+    """Rotation about z by `angle` rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.eye(3)
+    R[:2, :2] = [[c, -s], [s, c]]
+    return R[:dims, :dims]
+
+
+def tilted(a, b):
+    """A rotation of no particular kind."""
+    c, s = np.cos(b), np.sin(b)
+    return turned(a) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) @ turned(b - a)
+
+
+POSE = Pose(
+    position_m=np.array([4 * km, -7 * km, 300.0]),
+    rotation=tilted(0.4, 0.2),
+    velocity_mps=np.array([120.0, -60.0, 3.0]),
+)
+POLAR = Radar(range_m=30.0, azimuth_deg=0.8, elevation_deg=0.6)
+PLANAR = Radar(range_m=30.0, azimuth_deg=0.8)
+MOVING = Radar(range_m=30.0, azimuth_deg=0.8, elevation_deg=0.6, range_rate_mps=2.0, pose=POSE)
+ALL = Radar(
+    range_m=30.0,
+    azimuth_deg=0.8,
+    elevation_deg=0.6,
+    height_m=60.0,
+    pressure_altitude_m=40.0,
+    range_rate_mps=2.0,
+    site=SITE,
+)
+POINT = PositionSensor(x_m=20.0, y_m=35.0, z_m=50.0)
+FLAT = PositionSensor(x_m=20.0, y_m=35.0)
+
+
+@dataclass(frozen=True)
+class World:
+    """A motion, a sensor, and states that make sense in it."""
+
+    motion: Any
+    sensor: Any
+
+    def __str__(self):
+        seen = "-".join(name.split("_")[0] for name in self.sensor.names)
+        return f"{type(self.motion).__name__}{self.motion.dims}-{seen}"
+
+    def prior(self, seed):
+        """A mean some 5 to 60 km out and a full covariance (n, n), condition about 1e4."""
+        rng = np.random.default_rng(seed)
+        dims, n = self.motion.dims, len(self.motion.names)
+        spread = np.array([_SPREAD[name.rsplit("_", 1)[-1]] for name in self.motion.names])
+        spread[:dims] = 200.0
+        root = np.tril(rng.uniform(-0.5, 0.5, (n, n)), -1) + np.diag(rng.uniform(0.5, 1.5, n))
+        root *= spread[:, None]
+        mean = rng.normal(size=n) * spread
+        azimuth, ground = rng.uniform(-np.pi, np.pi), rng.uniform(5 * km, 60 * km)
+        mean[:2] = ground * np.cos(azimuth), ground * np.sin(azimuth)
+        if dims == 3:
+            mean[2] = rng.uniform(1 * km, 12 * km)
+        return mean, root @ root.T
+
+    def plot(self, mean, seed, sigmas=1.0):
+        """What the sensor would measure of `mean`, with noise."""
+        rng = np.random.default_rng((seed, 1))
+        parts = self.sensor.components(self.motion)
+        return np.array([c.value(mean) + sigmas * c.sigma * rng.normal() for c in parts])
+
+
+_SPREAD = {"m": 200.0, "mps": 80.0, "mps2": 3.0, "radps": 0.02, "km": 1.0}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One filter with settings; `curved` filters take angles and ranges."""
+
+    name: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    curved: bool = True
+
+    def __str__(self):
+        return "-".join([self.name, *(str(v).replace(" ", "") for v in self.settings.values())])
+
+    def recursion(self, world):
+        """Predict and update in `world`."""
+        chosen = catalogue.lookup(self.name).with_settings(**self.settings)
+        return chosen.recursion(world.motion, world.sensor)
+
+    def update(self, world, mean, cov, z):
+        """The formula itself, on floats: Posterior of one target."""
+        from boresight.maths import Gaussian
+
+        chosen = catalogue.lookup(self.name).with_settings(**self.settings)
+        components = world.sensor.components(world.motion)
+        return chosen.update(Gaussian(mean, cov), z, components, **dict(chosen.settings))
+
+
+RANGE_FIRST = ("range_m", "azimuth_rad", "elevation_rad")
+FILTERS = (
+    Entry("kf", curved=False),
+    Entry("ekf"),
+    Entry("ekf-sequential"),
+    Entry("ekf-sequential", {"order": RANGE_FIRST}),
+    Entry("iekf", {"iterations": 3}),
+    Entry("mekf"),
+    Entry("mekf", {"mu": "printed"}),
+    Entry("mekf", {"mu": "second order", "order": ("azimuth_rad", "elevation_rad")}),
+    Entry("mekf", {"mu": "none", "added_variance": False}),
+    Entry("mekf-block"),
+    Entry("mekf-block", {"mu": False, "added_variance": False}),
+)
+CURVED = tuple(entry for entry in FILTERS if entry.curved)
+
+LINEAR_WORLDS = (World(SPACE, POINT), World(PLANE, FLAT))
+POLAR_WORLDS = (
+    World(SPACE, POLAR),
+    World(PLANE, PLANAR),
+    World(SPACE, MOVING),
+    World(CoordinatedTurn(accel_mps2=1.0, turn_accel_degps2=0.3), PLANAR),
+    World(WithHeightOffset(inner=SPACE, drift_m_per_sqrt_s=2.0), ALL),
+)
+MOTIONS = (
+    PLANE,
+    SPACE,
+    ConstantVelocity(accel_mps2=1.5, dims=3, discretisation="continuous"),
+    ConstantVelocity(accel_mps2=1.5, dims=2, discretisation="printed"),
+    ConstantAcceleration(jerk_mps3=0.7, dims=3),
+    ConstantAcceleration(jerk_mps3=0.7, dims=2, discretisation="discrete"),
+    CoordinatedTurn(accel_mps2=1.0, turn_accel_degps2=0.3),
+    Static(drift_m_per_sqrt_s=3.0, dims=3),
+    Static(drift_m_per_sqrt_s=3.0, dims=2),
+    WithHeightOffset(inner=SPACE, drift_m_per_sqrt_s=2.0),
+    SphericalUnitRate(position_noise=0.1, velocity_noise=0.2),
+)

@@ -1,0 +1,161 @@
+"""What must not matter does not matter: whole turns, the frame, and what is missing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from boresight.models.motion import ConstantVelocity
+from boresight.models.sensors import Pose, Radar
+from laws.enrolled import (
+    CURVED,
+    FILTERS,
+    LINEAR_WORLDS,
+    POLAR,
+    POLAR_WORLDS,
+    POSE,
+    SPACE,
+    World,
+    turned,
+)
+
+seeds = st.integers(0, 2**32)
+angles = st.floats(-np.pi, np.pi)
+entries = pytest.mark.parametrize("entry", CURVED, ids=str)
+worlds = pytest.mark.parametrize("world", POLAR_WORLDS, ids=str)
+everywhere = pytest.mark.parametrize(
+    ("entry", "world"),
+    [(e, w) for e in FILTERS for w in (*LINEAR_WORLDS, *(POLAR_WORLDS if e.curved else ()))],
+    ids=str,
+)
+
+
+def same(a, b, rtol=1e-9):
+    """Two posteriors agree to `rtol` of the largest number of each kind."""
+    for one, other in ((a.mean, b.mean), (a.cov, b.cov)):
+        np.testing.assert_allclose(one, other, rtol=0, atol=rtol * np.max(np.abs(other)))
+    np.testing.assert_allclose([a.nis, a.loglik], [b.nis, b.loglik], rtol=1e-7)
+    assert a.dof == b.dof
+
+
+def drawn(world, seed):
+    mean, cov = world.prior(seed)
+    return mean, cov, world.plot(mean + np.linalg.cholesky(cov)[:, 0], seed)
+
+
+@worlds
+@entries
+@given(seed=seeds, turns=st.integers(-3, 3))
+def test_a_whole_turn_changes_nothing(entry, world, seed, turns):
+    mean, cov, z = drawn(world, seed)
+    i = world.sensor.names.index("azimuth_rad")
+    further = z.copy()
+    further[i] += turns * 2 * np.pi
+    same(entry.update(world, mean, cov, further), entry.update(world, mean, cov, z))
+
+
+@entries
+@given(seed=seeds, beside=st.floats(-0.02, 0.02))
+def test_the_seam_behind_the_sensor_is_a_place_like_any_other(entry, seed, beside):
+    world = World(SPACE, POLAR)
+    mean, cov, _ = drawn(world, seed)
+    mean[:2] = np.hypot(*mean[:2]) * np.array([-np.cos(beside), np.sin(beside)])
+    z = world.plot(mean, seed)
+    z[1] = np.angle(np.exp(1j * (np.pi - beside + 0.03)))  # 0.03 rad beyond, often over the seam
+    post = entry.update(world, mean, cov, z)
+    half = np.diag([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])  # half a turn: the seam is now ahead
+    ahead = entry.update(world, half @ mean, half @ cov @ half, z - [0.0, np.pi, 0.0])
+    same(post, ahead._replace(mean=half @ ahead.mean, cov=half @ ahead.cov @ half))
+
+
+@entries
+@pytest.mark.parametrize("dims", [2, 3])
+@given(seed=seeds, angle=angles)
+def test_rotating_the_world_about_z_rotates_the_answer(entry, dims, seed, angle):
+    sensor = Radar(range_m=30.0, azimuth_deg=0.8, elevation_deg=0.6 if dims == 3 else None)
+    world = World(ConstantVelocity(accel_mps2=2.0, dims=dims), sensor)
+    mean, cov, z = drawn(world, seed)
+    R = np.kron(np.eye(2), turned(angle, dims))
+    turned_z = z.copy()
+    turned_z[1] += angle
+    straight = entry.update(world, mean, cov, z)
+    round_about = entry.update(world, R @ mean, R @ cov @ R.T, turned_z)
+    same(round_about, straight._replace(mean=R @ straight.mean, cov=R @ straight.cov @ R.T))
+
+
+@entries
+@given(seed=seeds, angle=angles, east=st.floats(-3e4, 3e4), up=st.floats(-2e3, 2e3))
+def test_moving_world_and_sensor_together_moves_the_answer(entry, seed, angle, east, up):
+    world = World(SPACE, Radar(range_m=30.0, azimuth_deg=0.8, elevation_deg=0.6, pose=POSE))
+    mean, cov, z = drawn(world, seed)
+    T, d = turned(angle), np.array([east, -east / 3, up])
+    pose = Pose(
+        position_m=T @ POSE.position_m + d,
+        rotation=POSE.rotation @ T.T,
+        velocity_mps=T @ POSE.velocity_mps,
+    )
+    elsewhere = World(world.motion, replace(world.sensor, pose=pose))
+    R, shift = np.kron(np.eye(2), T), np.concatenate([d, np.zeros(3)])
+    here = entry.update(world, mean, cov, z)
+    there = entry.update(elsewhere, R @ mean + shift, R @ cov @ R.T, z)
+    same(there, here._replace(mean=R @ here.mean + shift, cov=R @ here.cov @ R.T))
+
+
+@worlds
+@entries
+@given(seed=seeds)
+def test_a_missing_component_is_a_component_the_sensor_does_not_have(entry, world, seed):
+    mean, cov, z = drawn(world, seed)
+    for i, name in enumerate(world.sensor.names):
+        reduced = replace(world.sensor, **{name.replace("_rad", "_deg"): None})
+        gap = z.copy()
+        gap[i] = np.nan
+        same(
+            entry.update(world, mean, cov, gap),
+            entry.update(World(world.motion, reduced), mean, cov, np.delete(z, i)),
+        )
+
+
+@everywhere
+@given(seed=seeds)
+def test_a_plot_without_any_component_changes_nothing(entry, world, seed):
+    mean, cov, z = drawn(world, seed)
+    post = entry.update(world, mean, cov, np.full(len(z), np.nan))
+    np.testing.assert_array_equal(post.mean, mean)
+    np.testing.assert_allclose(post.cov, cov, rtol=1e-12, atol=1e-12 * np.max(cov))
+    assert (post.nis, post.dof, post.loglik) == (0, 0, 0)
+
+
+@everywhere
+@given(seed=seeds, dt=st.floats(0.0, 30.0))
+def test_covariances_stay_covariances_and_inputs_stay_theirs(entry, world, seed, dt):
+    mean, cov, z = drawn(world, seed)
+    z[seed % len(z)] = np.nan
+    state, inputs = {"mean": mean, "cov": cov}, {"z": z, "dt": dt}
+    before = [array.copy() for array in (mean, cov, z)]
+    new, results = entry.recursion(world).step(state, inputs)
+    np.testing.assert_array_equal(new["cov"], new["cov"].T)
+    assert np.linalg.eigvalsh(new["cov"] / np.outer(*2 * [np.sqrt(np.diag(new["cov"]))]))[0] > 0
+    assert results["status"] == 0
+    for array, copy in zip((mean, cov, z), before, strict=True):
+        np.testing.assert_array_equal(array, copy)
+
+
+@worlds
+@pytest.mark.parametrize(
+    "entry", [e for e in CURVED if "sequential" in e.name or e.name == "mekf"], ids=str
+)
+@given(seed=seeds)
+def test_nis_and_likelihood_are_those_of_the_innovations(entry, world, seed):
+    mean, cov, z = drawn(world, seed)
+    z[seed % len(z)] = np.nan
+    post = entry.update(world, mean, cov, z)
+    there = ~np.isnan(z)
+    nu, s = post.innovation[there], post.variance[there]
+    assert post.dof == there.sum()
+    assert post.nis == pytest.approx(np.sum(nu**2 / s), rel=1e-12)
+    assert post.loglik == pytest.approx(-0.5 * np.sum(nu**2 / s + np.log(2 * np.pi * s)), rel=1e-12)
+    assert np.isnan(post.variance[~there]).all()
+    assert (post.innovation[~there] == 0).all()
