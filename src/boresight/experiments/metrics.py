@@ -7,6 +7,7 @@ every average it belongs to. `scans` is a slice, so `scans=slice(20, None)` leav
 Tracking and Navigation", section 5.4. Percent fit error: kashyap, tables 2 to 6, erratum K13.
 """
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -107,6 +108,7 @@ def nees(estimate: Estimate, truth: Truth) -> Array:
     return np.where(np.isfinite(square), square, np.inf)
 
 
+@lru_cache(maxsize=32)
 def _nees_kernel(n: int) -> Kernel:
     def step(state: Any, inputs: Any) -> tuple[Any, Any]:
         L, inverse = cholesky(inputs["cov"])

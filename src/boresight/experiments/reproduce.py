@@ -30,7 +30,7 @@ def reproduce(
 
     Returns:
         `claims`, each with `id`, `where`, `published`, `ours`, `band`, `verdict`, `assumption`
-        (and `parts` where it has some); `figures`, the files written; `seed`; `runs`.
+        (and `parts` where it has some); `figures`, the files written; `seed`.
 
     Raises:
         UsageError: an unknown paper.
@@ -43,7 +43,6 @@ def reproduce(
         "claims": [claim.as_dict() for claims, _ in results for claim in claims],
         "figures": [file for _, files in results for file in files],
         "seed": seed,
-        "runs": runs,
     }
 
 
