@@ -50,7 +50,7 @@ def test_the_table_holds_every_published_edition():
 
 @pytest.mark.parametrize(("category", "name"), SPECS)
 def test_random_records_of_every_edition_are_read_as_libasterix_reads_them(category, name):
-    rng = random.Random(f"{category} {name}")
+    rng = random.Random(f"{category} {name}")  # noqa: S311  (a repeatable test)
     spec = SPECS[category, name]
     records = [random_record(spec, rng) for _ in range(RECORDS)]
     ours = read(category, name, records)
@@ -83,7 +83,7 @@ def compare_field(ours, path, field, theirs):
 
 @pytest.mark.parametrize(("category", "name"), SPECS)
 def test_what_we_read_we_encode_to_the_same_octets(category, name):
-    rng = random.Random(f"back {category} {name}")
+    rng = random.Random(f"back {category} {name}")  # noqa: S311  (a repeatable test)
     records = [random_record(SPECS[category, name], rng, least=1) for _ in range(RECORDS)]
     ours = read(category, name, records)
     columns = {}

@@ -125,23 +125,21 @@ def why_not(data: bytes, at: int, end: int) -> str:
 
 
 def candidates(octets: Octets, regions: list[Region], category: int) -> tuple[Integers, Integers]:
-    """Return starts and ends of everything in damaged regions that might be a block."""
-    starts, ends = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
-    for start, end, _ in regions:
-        inside = octets[start : max(start, end - HEADER)]
-        at = np.flatnonzero(inside == category) + start
-        after = at + (octets[at + 1].astype(np.int64) << 8 | octets[at + 2])
-        fits = (after > at + HEADER) & (after <= end)
-        starts.append(at[fits])
-        ends.append(after[fits])
-    return np.concatenate(starts), np.concatenate(ends)
+    """Return starts and ends of everything in regions (in order) that might be a block."""
+    first = np.array([region.start for region in regions], np.int64)
+    last = np.array([region.end for region in regions], np.int64)
+    at = np.flatnonzero(octets[:-HEADER] == category)
+    index = np.searchsorted(first, at, side="right") - 1
+    after = at + (octets[at + 1].astype(np.int64) << 8 | octets[at + 2])
+    fits = (index >= 0) & (after > at + HEADER) & (after <= last[index])
+    return at[fits], after[fits]
 
 
-def first_of_overlapping(starts: Integers, ends: Integers) -> list[int]:
-    """Return the indices of blocks, by start, each beginning after the one kept before it."""
-    kept, reached = [], -1
-    for index in np.argsort(starts, kind="stable").tolist():
-        if starts[index] >= reached:
+def last_of_overlapping(starts: Integers, ends: Integers) -> list[int]:
+    """Return the indices of blocks, last first, each ending before the one kept before it."""
+    kept, reached = [], np.iinfo(np.int64).max
+    for index in np.argsort(-starts, kind="stable").tolist():
+        if ends[index] <= reached:
             kept.append(index)
-            reached = ends[index]
+            reached = starts[index]
     return kept

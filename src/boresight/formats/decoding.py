@@ -1,8 +1,7 @@
-"""The blocks of one chunk decoded, each source in its own edition, and what damage left of others.
+"""The blocks of one chunk decoded, each source in its own edition.
 
 A block is taken as undamaged when its records fill it exactly in its source's edition and each
-names its source. Everything between such blocks is searched once more for blocks of a source that
-is known already, which a wrong length may have hidden.
+names its source.
 """
 
 from collections import Counter
@@ -21,7 +20,7 @@ from boresight.formats.specs import Edition, categories
 from boresight.formats.wire import Flags, Integers, Octets
 
 _FEW = 16  # sources of a category whose edition is looked for one by one
-_ODD = 0.01  # share of records without a source below which those are damage, not habit
+_ODD = 0.5  # share of records without a source below which those are damage, not habit
 
 
 class Batch(NamedTuple):
@@ -44,6 +43,7 @@ class Account:
     unknown: Counter[int] = field(default_factory=Counter)
     counts: Counter[str] = field(default_factory=Counter)
     editions: dict[tuple[int, int], Choice] = field(default_factory=dict)
+    good: set[int] = field(default_factory=set)
     decoded: int = 0
 
 
@@ -56,26 +56,33 @@ class Chunk(NamedTuple):
     ends: Integers
     gaps: list[Region]
 
+    def until(self, end: int) -> "Chunk":
+        """Return what lies whole before an offset."""
+        keep = self.ends <= end
+        gaps = [gap for gap in self.gaps if gap.end <= end]
+        return Chunk(self.octets, self.base, self.starts[keep], self.ends[keep], gaps)
 
-def decode_chunk(part: Chunk, account: Account) -> tuple[list[Batch], list[Region]]:
-    """Decode the blocks of a chunk and whatever its damaged places still hold."""
+
+def decode_chunk(part: Chunk, account: Account) -> tuple[list[Batch], Flags]:
+    """Decode the blocks of a chunk; return the records and which blocks were good.
+
+    Blocks of categories that are not read count as good here.
+    """
     batches: list[Batch] = []
     is_good = np.ones(len(part.starts), bool)
     kinds = part.octets[part.starts] if len(part.starts) else np.empty(0, np.uint8)
-    for category in np.unique(kinds).tolist():
+    for category in categories():
         mine = np.flatnonzero(kinds == category)
-        if category not in categories():
-            account.unknown[category] += len(mine)
-            continue
-        for rows, records in _by_edition(part, mine, category, account):
+        for rows, records in _by_edition(part, mine, category, account) if len(mine) else ():
             kept, good = _without_nameless(records)
             is_good[rows] = good
             batches.append(Batch(kept, part.base))
-    damage = _damage(part, is_good)
-    found, damage = _rescue(part, damage, account)
-    batches += found
-    account.decoded += sum(len(batch.records) for batch in batches)
-    return [batch for batch in batches if len(batch.records)], damage
+            account.good.update(np.unique(_keys(category, part, rows[good])).tolist())
+    return batches, is_good
+
+
+def _keys(category: int, part: Chunk, rows: NDArray[np.intp]) -> Integers:
+    return category << 16 | sources(part.octets, part.starts[rows])
 
 
 def sources(octets: Octets, starts: Integers) -> NDArray[np.int64]:
@@ -143,76 +150,10 @@ def _second_thought(
 
 
 def _without_nameless(records: Records) -> tuple[Records, Flags]:
-    """Drop blocks with a record that names no source, where hardly any record does not."""
+    """Drop blocks with a record that names no source, where most records do."""
     good = records.is_good.copy()
     nameless = ~records.has("010")
-    if 0 < nameless.sum() <= max(1, _ODD * len(records)):
+    if 0 < nameless.sum() < _ODD * len(records):
         good[records.block[nameless]] = False
         records = records.take(good[records.block])
     return records, good
-
-
-def _damage(part: Chunk, is_good: Flags) -> list[Region]:
-    """Join bad blocks and gaps between blocks that touch, in the order of the file."""
-    bad = [
-        Region(int(part.starts[i]), int(part.ends[i]), _why_bad(part, i))
-        for i in np.flatnonzero(~is_good)
-    ]
-    joined: list[Region] = []
-    for region in sorted([*bad, *part.gaps]):
-        if joined and region.start == joined[-1].end:
-            joined[-1] = joined[-1]._replace(end=region.end)
-        else:
-            joined.append(region)
-    return joined
-
-
-def _why_bad(part: Chunk, index: np.intp) -> str:
-    return f"the records of a block of category {part.octets[part.starts[index]]} do not fill it"
-
-
-def _rescue(
-    part: Chunk, damage: list[Region], account: Account
-) -> tuple[list[Batch], list[Region]]:
-    """Decode the blocks of known sources that lie whole inside damaged places."""
-    batches: list[Batch] = []
-    spans: list[tuple[int, int]] = []
-    for category in categories() if damage else ():
-        starts, ends = blocks.candidates(part.octets, damage, category)
-        codes = sources(part.octets, starts)
-        for (its, code), choice in account.editions.items():
-            mine = codes == code
-            if its == category and choice.score > 0 and mine.any():
-                records = _whole(part, starts[mine], ends[mine], choice.edition)
-                chosen = np.unique(records.block)
-                spans += zip(
-                    starts[mine][chosen].tolist(), ends[mine][chosen].tolist(), strict=True
-                )
-                batches.append(Batch(records, part.base))
-    return batches, _without(damage, spans)
-
-
-def _whole(part: Chunk, starts: Integers, ends: Integers, edition: Edition) -> Records:
-    """Decode candidates; keep those that hold sources throughout and do not overlap."""
-    records = decode(part.octets, starts, ends, edition)
-    good = records.is_good.copy()
-    good[records.block[~records.has("010")]] = False
-    index = np.flatnonzero(good)
-    kept = np.zeros(len(good), bool)
-    kept[index[blocks.first_of_overlapping(starts[index], ends[index])]] = True
-    return records.take(kept[records.block])
-
-
-def _without(damage: list[Region], spans: list[tuple[int, int]]) -> list[Region]:
-    """Cut rescued blocks out of damaged places."""
-    left: list[Region] = []
-    spans = sorted(spans)
-    for start, end, reason in damage:
-        at = start
-        for first, last in (span for span in spans if start <= span[0] < end):
-            if first > at:
-                left.append(Region(at, first, reason))
-            at = max(at, last)
-        if at < end:
-            left.append(Region(at, end, reason))
-    return left

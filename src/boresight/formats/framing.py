@@ -234,6 +234,9 @@ def _in_a_row(frames: Frames, head: bytes) -> int:
 def _count(frames: Frames, head: bytes, at: int) -> int:
     count = 0
     while count < _ENOUGH and (after := frames.after(head, at)) > 0:
+        end = after - frames.tail
+        if follow(head, at + frames.head, end).stop != end:
+            break
         at = after
         count += 1
     return count

@@ -5,7 +5,7 @@ docstring describes it. Read once, at first use.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from typing import Any, Literal
@@ -55,8 +55,8 @@ class Shape:
     size: int = 0
     parts: tuple[int, ...] = ()
     is_open: bool = True
-    fields: tuple[Field, ...] = ()
-    slots: tuple["Slot | None", ...] = ()
+    fields: tuple[Field, ...] = field(default=(), repr=False)
+    slots: tuple["Slot | None", ...] = field(default=(), repr=False)
     fspec: int = 0
 
     def field(self, name: str) -> Field:
@@ -81,7 +81,7 @@ class Edition:
 
     category: int
     name: str
-    record: Shape
+    record: Shape = field(repr=False)
 
     def frn(self, item: str) -> int | None:
         """Return the index (from 0) of `item` in the user application profile, if it is there."""

@@ -10,6 +10,7 @@ from boresight.formats import blocks
 from boresight.formats.blocks import Region
 from boresight.formats.decoding import Account, Batch, Chunk, decode_chunk
 from boresight.formats.framing import Framing, Payloads, Raw, detect
+from boresight.formats.salvage import calm_end, salvage
 from boresight.formats.specs import categories
 
 CHUNK = 16 * 1024 * 1024
@@ -40,28 +41,49 @@ def stream(
         DataError: it is no ASTERIX recording; or, with `strict`, something in it is damaged.
     """
     account.bytes = path.stat().st_size
-    for part in _chunks(path, account, chunk):
-        batches, damage = decode_chunk(part, account)
-        _tell(damage, part.base, account, strict=strict)
-        yield from batches
-        if progress is not None:
-            progress(min(part.base + len(part.octets), account.bytes), account.bytes)
-    _refuse_other_formats(path, account)
-
-
-def _chunks(path: Path, account: Account, size: int) -> Iterator[Chunk]:
     with path.open("rb") as file:
         framing = detect(file.read(_HEAD))
         account.framing = framing.name
         file.seek(framing.first)
         base, rest, more = framing.first, b"", True
         while more:
-            read = file.read(size)
-            more = len(read) == size
+            read = file.read(chunk)
+            more = len(read) == chunk
             data = rest + read
-            part, stop = _split(framing, data, base, account, more=more)
-            yield part
+            batches, stop = _read(framing, data, base, account, more=more, strict=strict)
+            yield from batches
             rest, base = data[stop:], base + stop
+            if progress is not None:
+                progress(base, account.bytes)
+    _refuse_other_formats(path, account)
+
+
+def _read(
+    framing: Framing, data: bytes, base: int, account: Account, *, more: bool, strict: bool
+) -> tuple[list[Batch], int]:
+    """Decode one buffer; return its records and where the next buffer starts."""
+    part, stop = _split(framing, data, base, account, more=more)
+    is_open = more and isinstance(framing, Raw)
+    if is_open and len(part.starts):
+        stop = _settled(part, stop)
+        part = part.until(stop)
+    batches, is_good = decode_chunk(part, account)
+    calm = calm_end(part, is_good, stop) if is_open else stop
+    if calm < stop:
+        part, stop = part.until(calm), calm
+        batches, is_good = decode_chunk(part, account)
+    found = salvage(part, batches, is_good, account)
+    account.unknown.update(found.unknown)
+    account.decoded += sum(len(batch.records) for batch in found.batches)
+    _tell(found.damage, base, account, strict=strict)
+    return found.batches, stop
+
+
+def _settled(part: Chunk, stop: int) -> int:
+    """Return the start of the last block that is read: what follows may show that it is none."""
+    read = part.starts[np.isin(part.octets[part.starts], categories())]
+    near = read[read >= stop - 2 * blocks.LARGEST]
+    return int(near[-1] if len(near) else part.starts[-1])
 
 
 def _split(

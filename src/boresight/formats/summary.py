@@ -147,7 +147,7 @@ def notes(account: Account) -> list[str]:
         f"CAT{category:03d} of {sensor_name(code)}: editions {', '.join(choice.alike)} read alike, "
         f"{choice.edition.name} is named."
         for (category, code), choice in sorted(account.editions.items())
-        if len(choice.alike) > 1
+        if len(choice.alike) > 1 and category << 16 | code in account.good
     ]
     if account.trailing:
         found.append(
