@@ -51,7 +51,7 @@ app = App(
 
 @app.command
 def inspect(file: File, /, *, strict: Strict = False, columns: Columns = None) -> Job:
-    """Say what a recording holds: format, categories, sensors, times, damage."""
+    """Say what a recording holds: format, sensors, times, damage."""
     return partial(jobs.inspect, file, strict=strict, columns=_columns(columns))
 
 
@@ -86,7 +86,7 @@ def track(
 
 @app.command
 def demo(*, output: Output = Path("boresight-demo")) -> Job:
-    """Track the built-in recording, compare with its known truth, write the report."""
+    """Track the built-in recording and compare it with its known truth."""
     return partial(jobs.demo, output)
 
 
@@ -99,13 +99,13 @@ def reproduce(
     seed: Annotated[int | None, Parameter(help="Seed instead of the usual one.")] = None,
     output: Figures = None,
 ) -> Job:
-    """Repeat a paper's tables, figures and claims, with a verdict for each."""
+    """Repeat a paper's tables and claims, with a verdict for each."""
     return partial(jobs.reproduce, key, runs=runs, seed=seed, folder=output)
 
 
 @app.command
 def cite(name: Annotated[str, Parameter(help="A filter's name, such as mekf.")], /) -> Job:
-    """Print the reference of a filter, and where the code differs from it."""
+    """Print a filter's reference, and where the code differs from it."""
     return partial(jobs.cite, name)
 
 

@@ -1,16 +1,19 @@
 """The commands' work: each calls the floors below and returns an answer; none of them prints."""
 
 import hashlib
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from boresight.errors import DataError
 from boresight.interfaces import door, screens
 from boresight.interfaces.answers import Answer
 from boresight.interfaces.terminal import Manner, progress
 
 if TYPE_CHECKING:
+    from boresight.interfaces.report import Report
     from boresight.maths.frames import Site
     from boresight.tracking.result import TrackingResult
 
@@ -56,6 +59,8 @@ def track(
     chosen, target = catalogue.lookup(name), door.folder(folder) if folder else None
     with progress(f"Reading {file.name}", manner) as watch:
         read = read_recording(file, strict=strict, columns=columns, progress=watch.count)
+    if read.plots.is_empty():
+        raise no_plots(file, read.summary)
     source = door.sensor(sensor, sensors(read.summary)) if sensor else None
     with progress(f"Tracking with {name}", manner) as watch:
         result = track_plots(
@@ -66,11 +71,21 @@ def track(
         about = read.summary | {"file": file.name, "sha256": sha256(file)}
         with progress("Writing", manner):
             page = report(result, inspection=about, command=manner.command)
-            outputs = [str(page.save(target / REPORT)), *write_tables(result, target)]
+            outputs = write(page, result, target)
     return Answer(
         content=tracking_content(result, outputs),
         screen=lambda width: screens.tracked(result, outputs, width),
         remarks=[*read.summary.get("notes", ()), *result.remarks],
+    )
+
+
+def no_plots(file: Path, summary: Mapping[str, Any]) -> DataError:
+    """The error of a recording that holds anything but a radar's plots."""
+    held = [f"CAT{row['category']:03d}" for row in summary["categories"] if row["category"]]
+    return DataError(
+        f"{file} holds no plots to track",
+        why=f"it holds {', '.join(held) or 'no records'}; plots are CAT048 or CAT010",
+        next_step=f"boresight inspect {shlex.quote(str(file))}",
     )
 
 
@@ -86,13 +101,19 @@ def sha256(file: Path) -> str:
         return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
-def write_tables(result: "TrackingResult", folder: Path) -> list[str]:
-    """Write the tracks as Parquet, CSV and, where the site is known, GeoJSON; return the paths."""
+def write(page: "Report", result: "TrackingResult", folder: Path) -> list[str]:
+    """Write the report and the tracks into a folder; return the paths.
+
+    GeoJSON is written where the site is known: without it a track has no place on Earth.
+    """
     from boresight.formats.output import write_table
 
-    has_places = result.tracks["latitude_deg"].count() > 0
+    latitudes = result.tracks["latitude_deg"].cast(float).fill_null(float("nan"))
+    has_places = bool(latitudes.is_finite().any())
     names = [name for name in TABLES if has_places or not name.endswith(".geojson")]
-    return [str(write_table(result.tracks, folder / name, "tracks")) for name in names]
+    paths = [page.save(folder / REPORT)]
+    paths += [write_table(result.tracks, folder / name, "tracks") for name in names]
+    return [str(path) for path in paths]
 
 
 def tracking_content(result: "TrackingResult", outputs: Sequence[str]) -> dict[str, Any]:
@@ -116,6 +137,8 @@ def tracking_content(result: "TrackingResult", outputs: Sequence[str]) -> dict[s
 
 def demo(folder: Path, manner: Manner) -> Answer:
     """Track the recording in the package, compare with its truth, write report and tables."""
+    from importlib.resources import as_file, files
+
     from boresight.experiments.demo import run_demo
     from boresight.interfaces.report import report
 
@@ -124,12 +147,18 @@ def demo(folder: Path, manner: Manner) -> Answer:
         found = run_demo(progress=watch.say)
     result = list(found.results.values())[-1]
     result = replace(result, remarks=[*found.remarks, *result.remarks])
-    about = found.recording.summary | {"file": "The built-in demo recording"}
-    page = report(result, found.comparisons, about, manner.command, as_seen=found.as_seen)
-    written = page.save(target / REPORT)
-    outputs = [str(written), *write_tables(result, target)]
+    with as_file(files("boresight") / "demo" / "recording.ast") as file:
+        about = {"file": "The built-in demo recording", "sha256": sha256(file)}
+    page = report(
+        result,
+        found.comparisons,
+        found.recording.summary | about,
+        manner.command,
+        as_seen=found.as_seen,
+    )
+    outputs = write(page, result, target)
     content = tracking_content(result, outputs) | {
-        "report": str(written),
+        "report": outputs[0],
         "comparisons": [asdict(each) for each in found.comparisons],
         "as_seen": [asdict(each) for each in found.as_seen],
         "plot_error": found.plot_error._asdict(),
@@ -137,11 +166,15 @@ def demo(folder: Path, manner: Manner) -> Answer:
     }
     return Answer(
         content=content,
-        screen=lambda width: [
-            screens.compared(AGAINST_TRUTH, found.comparisons),
-            screens.compared(AS_SEEN, found.as_seen),
-            *screens.tracked(result, outputs, width),
-        ],
+        screen=lambda width: screens.tracked(
+            result,
+            outputs,
+            width,
+            [
+                screens.compared(AGAINST_TRUTH, found.comparisons),
+                screens.compared(AS_SEEN, found.as_seen),
+            ],
+        ),
         remarks=result.remarks,
     )
 

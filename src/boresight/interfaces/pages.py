@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 SUMMARY = "Track targets from radar recordings, and say how far the tracks can be trusted."
 COMMANDS = {
-    "inspect": "Say what a recording holds: format, categories, sensors, times, damage.",
+    "inspect": "Say what a recording holds: format, sensors, times, damage.",
     "track": "Turn a recording into tracks, tables and a report.",
-    "demo": "Track the built-in recording, compare with its known truth, write the report.",
-    "reproduce": "Repeat a paper's tables, figures and claims, with a verdict for each.",
-    "cite": "Print the reference of a filter, and where the code differs from it.",
+    "demo": "Track the built-in recording and compare it with its known truth.",
+    "reproduce": "Repeat a paper's tables and claims, with a verdict for each.",
+    "cite": "Print a filter's reference, and where the code differs from it.",
 }
 OPTIONS = {
     "--json": "Print one JSON object on standard output, and nothing else there.",

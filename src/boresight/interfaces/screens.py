@@ -55,7 +55,7 @@ def inspected(path: str, found: dict[str, Any]) -> "list[RenderableType]":
         )
     table.title = None
     addresses = f"{figure(found['addresses'])} different 24-bit addresses"
-    return [_text(path, "bold"), _text(head), _text(""), table, *_damage(found), _text(addresses)]
+    return [_text(path, "bold"), _text(head), table, *_damage(found), _text(addresses)]
 
 
 def _damage(found: dict[str, Any]) -> "list[RenderableType]":
@@ -71,14 +71,19 @@ def _damage(found: dict[str, Any]) -> "list[RenderableType]":
     return [_text(line, "yellow") for line in lines]
 
 
-def tracked(result: "TrackingResult", outputs: Sequence[str], width: int) -> "list[RenderableType]":
-    """The screen of `boresight track`."""
+def tracked(
+    result: "TrackingResult",
+    outputs: Sequence[str],
+    width: int,
+    truth: "Sequence[RenderableType]" = (),
+) -> "list[RenderableType]":
+    """The screen of `boresight track`; of `boresight demo`, with what the truth says of it."""
     head = (
         f"{figure(result.used)} of {figure(result.plots)} plots "
         f"({percent(result.used, result.plots)}) in {figure(len(result.targets))} tracks, "
         f"filter {result.filter}; {figure(result.rejected)} outside their track's gate"
     )
-    parts = [_text(head, "bold"), _text(""), _nis(result), _worst(result, width)]
+    parts = [_text(head, "bold"), _text(""), *truth, _nis(result), _worst(result, width)]
     if not result.skipped.is_empty():
         parts.append(_skipped(result))
     return [*parts, *_written(outputs)]
@@ -88,6 +93,8 @@ def _nis(result: "TrackingResult") -> "RenderableType":
     heading = "NIS per degree of freedom (1 is consistent)"
     table = _table(heading, "", "mean", "median", "plots")
     for name, entry in result.nis.items():
+        if not entry.get("scans"):
+            continue
         words = NIS_WORDS.get(name, name.replace("_", " "))
         mean, median = (figure(entry.get(key), 3) for key in ("mean", "median"))
         table.add_row(words, mean, median, f"{entry.get('scans', 0):,.0f}")

@@ -49,8 +49,10 @@ def show(answer: Answer, manner: Manner) -> None:
         write_object(answer.content)
     else:
         console = _console(sys.stdout)
-        for part in answer.screen(console.width):
-            console.print(part, crop=False)
+        with console.capture() as screen:  # rich would end the program at a broken pipe
+            for part in answer.screen(console.width):
+                console.print(part, crop=False)
+        sys.stdout.write(screen.get())
     if not manner.is_quiet:
         remark(answer.remarks)
 

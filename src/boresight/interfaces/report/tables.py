@@ -112,6 +112,7 @@ def nis(result: "TrackingResult") -> str:
         + [number_cell(chi_square_median(entry), 3)]
         + [Cell(f"{entry.get(key, 0):,.0f}", is_figure=True) for key in ("dof", "scans")]
         for name, entry in result.nis.items()
+        if entry.get("scans")
     ]
     return table("NIS per degree of freedom; 1 is consistent", heads, rows)
 

@@ -134,8 +134,8 @@ def _turns(result: "TrackingResult") -> Iterator[Sentence]:
         yield Sentence(
             "attention",
             f"Over all scans, turns included, NIS per degree of freedom is {every['mean']:.2f} "
-            f"(median {every['median']:.2f}): a filter that assumes constant velocity lags behind a turn, "
-            "and its covariance does not show it.",
+            f"(median {every['median']:.2f}): a filter that assumes constant velocity lags behind "
+            "a turn, and its covariance does not show it.",
             "consistency",
         )
 
