@@ -16,11 +16,11 @@ from boresight.maths.frames import Site, enu_at_height
 from boresight.tracking.gating import ManoeuvreGate
 
 Array = Any
-# What a manoeuvre may do, as a standard deviation: 3 m/s² standing (a car), 13 at 100 m/s (a light
-# aircraft in a steep turn), 28 at 250 m/s. An airliner's turn makes a fifth of that, but a filter
+# What a manoeuvre may do, as a standard deviation: 3 m/s² standing (a car), 8 at 100 m/s (a light
+# aircraft in a steep turn), 15.5 at 250 m/s. An airliner's turn makes a third of that, but a filter
 # set for straight flight lags, and its lag must not look like a wild plot.
 MANOEUVRE_MPS2 = 3.0
-MANOEUVRE_RADPS = 0.1
+MANOEUVRE_RADPS = 0.05
 GATE = 16.27  # 99.9 % of chi-square with three degrees of freedom
 PATIENCE = 3  # rejections in a row after which a track starts anew
 SPEED_MPS = 200.0  # spread of a new track's velocity, horizontal
