@@ -18,6 +18,7 @@ from boresight.errors import FormulaError, UsageError
 from boresight.lanes.trace import COMPARISONS, FOLD, Graph, located
 
 Array = Any
+_NUMPY_S = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError)  # what it raises
 LARGEST = 8_000  # operations; compile time grows faster than linearly above it
 
 
@@ -58,7 +59,10 @@ class Leaf:
         """The inverse of `build`."""
         array = np.asarray(value)
         if array.shape != self.shape:
-            raise UsageError(f"declared shape {self.shape}, but the formula gave {array.shape}")
+            raise FormulaError(
+                f"declared shape {self.shape}, but the formula gave {array.shape}",
+                next_step="declare the leaf in the shape that the formula gives",
+            )
         return list(array[np.triu_indices(self.shape[0])] if self.symmetric else array.ravel())
 
     def pack(self, values: Array) -> Array:
@@ -212,7 +216,7 @@ def trace(
         output_nodes = [_nodes(graph, s, results) for s in wanted]
     except FormulaError:
         raise
-    except (TypeError, ValueError, ArithmeticError, AttributeError, np.linalg.LinAlgError) as error:
+    except _NUMPY_S as error:
         raise located(error) from error
     program = assemble(graph, slots, states, wanted, state_nodes, output_nodes)
     if program.operations > LARGEST:

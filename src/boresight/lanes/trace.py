@@ -26,6 +26,7 @@ _COMMUTE = frozenset({"add", "mul", "and", "or"})
 _ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
 _UNITS = (1.0, -1.0)
 _INNER = (f"{Path(__file__).parent}{os.sep}", f"{Path(np.__file__).parent}{os.sep}", "<frozen")
+_STDLIB = str(Path(os.__file__).parent)
 
 FOLD: dict[str, Callable[..., Any]] = {
     "add": np.add,
@@ -57,10 +58,15 @@ FOLD: dict[str, Callable[..., Any]] = {
 }
 
 
+def _is_inner(file: str) -> bool:
+    """Whether a file is ours, NumPy's or Python's: not where the formula stands."""
+    return file.startswith(_INNER) or os.path.dirname(file) == _STDLIB  # noqa: PTH120 - a string
+
+
 def _place() -> str:
-    """File and line of the formula: the innermost frame outside this folder and NumPy."""
+    """File and line of the formula: the innermost frame that is not ours, NumPy's or Python's."""
     frame = sys._getframe(1)  # noqa: SLF001 - the only way to name the caller's line cheaply
-    while frame.f_back and frame.f_code.co_filename.startswith(_INNER):
+    while frame.f_back and _is_inner(frame.f_code.co_filename):
         frame = frame.f_back
     return f"{frame.f_code.co_filename}, line {frame.f_lineno}"
 
@@ -336,7 +342,7 @@ def located(error: BaseException) -> FormulaError:
     place, step = "", error.__traceback__
     while step:
         name = step.tb_frame.f_code.co_filename
-        if not name.startswith(_INNER):
+        if not _is_inner(name):
             place = f"{name}, line {step.tb_lineno}"
         step = step.tb_next
     return FormulaError(
