@@ -137,6 +137,7 @@
   };
 
   const start = async () => {
+    byId("no-script").remove();
     const script = document.createElement("script");
     script.textContent = await inflate("library");
     document.head.append(script);

@@ -136,8 +136,8 @@ def _sentence(each: Sentence) -> str:
 
 def _plan(parts: Parts) -> str:
     nothing = (
-        '<noscript><p class="noscript">The charts of this page need JavaScript. Its sentences and '
-        "tables do not.</p></noscript>"
+        '<p class="noscript" id="no-script">The charts of this page need JavaScript. Its sentences '
+        "and tables do not.</p>"
     )
     view = panel("plan-chart", parts.plan_caption, alt="plan view of plots and tracks")
     some = len(parts.result.targets) - parts.series.targets
