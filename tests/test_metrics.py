@@ -23,7 +23,7 @@ def made(mean, cov=None, **others):
 
 def truth_of(states, names=NAMES):
     states = np.asarray(states, dtype=float)
-    return Truth(np.arange(states.shape[1], dtype=float), states, names)
+    return Truth(np.arange(states.shape[1], dtype=float), states, names, states[:, 0])
 
 
 def random_covariances(generator, *shape, n=6):
@@ -49,6 +49,15 @@ def test_rmse_by_hand():
 def test_an_unknown_quantity_is_refused():
     with pytest.raises(UsageError, match="altitude"):
         metrics.rmse(made(np.zeros((1, 1, 6))), truth_of(np.zeros((1, 1, 6))), of="altitude")
+
+
+def test_an_estimate_without_what_is_needed_is_refused():
+    found, truth = made(np.zeros((1, 2, 6))), truth_of(np.zeros((1, 2, 6)))
+    for metric in (lambda: metrics.anees(found, truth), lambda: metrics.anis(found)):
+        with pytest.raises(UsageError, match="in outputs"):
+            metric()
+    with pytest.raises(UsageError, match=r"\(1, 2, 6\).*\(1, 3, 6\)"):
+        metrics.rmse(found, truth_of(np.zeros((1, 3, 6))))
 
 
 def test_a_lost_run_counts():

@@ -113,6 +113,13 @@ def test_table_3_is_judged_number_by_number(claims):
     assert claim["verdict"] == "does not reproduce"
 
 
+def test_table_3_is_judged_by_the_length_and_reading_kindest_to_it(claims):
+    claim = claims["AD-T3"]
+    counts = [int(n) for n in re.findall(r"steps: (\d+)", claim["assumption"])]
+    assert len(counts) == len(claims["AD-C1"]["band"])
+    assert sum(part["verdict"] == "in band" for part in claim["parts"]) == max(counts)
+
+
 def test_another_seed_gives_other_numbers_and_the_same_verdicts(claims):
     other = reproduce("aditya", seed=11)
     for claim in other["claims"]:

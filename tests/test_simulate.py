@@ -93,6 +93,17 @@ def test_an_unknown_scenario_is_answered_with_the_nearest():
         simulate("kashyap-set2", runs=1, seed=1)
 
 
+def test_truth_noise_and_start_do_not_share_their_numbers():
+    """5,000 runs: 5 standard deviations of a correlation are 0.07."""
+    world = lookup("kashyap-set-2")
+    truth, plots = simulate(replace(world, scans=2), runs=5000, seed=6)
+    offset = plots.prior.mean - world.initial
+    pushes = (truth.states[:, 1] - truth.states[:, 0])[:, 3:]
+    noise = plots.z[:, 0] - _polar(truth.states[:, 0])
+    correlation = np.corrcoef(np.hstack([offset, pushes, noise]).T) - np.eye(12)
+    assert np.max(np.abs(correlation)) < 0.07
+
+
 def test_truth_does_not_depend_on_the_sensor_and_sensors_share_their_noise():
     sharp = Radar(range_m=3.0, azimuth_deg=0.15, elevation_deg=0.15)
     truth, plots = simulate("kashyap-set-2", runs=5, seed=1)

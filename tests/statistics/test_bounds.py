@@ -10,7 +10,7 @@ from boresight.experiments.metrics import rmse
 from boresight.experiments.montecarlo import filtered
 from boresight.experiments.scenario import lookup
 from boresight.experiments.simulate import simulate
-from boresight.models.motion import ConstantVelocity
+from boresight.models.motion import ConstantVelocity, SphericalUnitRate
 from boresight.models.sensors import PositionSensor
 from oracles import textbook
 
@@ -65,3 +65,22 @@ def test_what_was_not_measured_tells_nothing():
     for k in range(world.scans):
         expected = F @ expected @ F.T + Q if k else expected
         assert np.allclose(bound[:, k], expected, rtol=1e-9)
+
+
+def test_a_motion_that_is_not_linear_is_linearised_where_the_target_was():
+    """One long step without a plot: F P F' + Q, F from central differences at the start."""
+    motion = SphericalUnitRate(position_noise=0.01, velocity_noise=0.01)
+    world = replace(lookup("aditya"), motion=motion, dt_s=0.3, scans=2)
+    truth, plots = simulate(world, runs=2, seed=4)
+    blind = plots._replace(z=np.full_like(plots.z, np.nan))
+    bound = bound_per_trajectory(truth, blind, motion, world.sensor)
+    expected = np.broadcast_to(world.prior_cov, (2, 6, 6))
+    for k, before in enumerate((truth.start, truth.states[:, 0])):
+        F = np.stack([_slopes(lambda x: motion.move(x, 0.3), x) for x in before])
+        expected = F @ expected @ np.swapaxes(F, 1, 2) + motion.noise(0.3)
+        assert np.allclose(bound[:, k], expected, rtol=1e-6, atol=1e-9)
+
+
+def _slopes(f, x, step=1e-5):
+    steps = step * np.eye(len(x))
+    return np.stack([(f(x + e) - f(x - e)) / (2 * step) for e in steps], axis=1)

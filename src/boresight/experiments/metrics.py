@@ -43,8 +43,20 @@ class Consistency(NamedTuple):
 
 def errors(estimate: Estimate, truth: Truth) -> Array:
     """Estimate minus truth, (runs, scans, n); infinite where the estimate is not a number."""
-    difference = estimate.mean - truth.states
+    mean = _output(estimate, "mean")
+    if mean.shape != truth.states.shape:
+        raise UsageError(f"the estimate is {mean.shape} and the truth {truth.states.shape}")
+    difference = mean - truth.states
     return np.where(np.isfinite(difference), difference, np.inf)
+
+
+def _output(estimate: Estimate, name: str) -> Array:
+    try:
+        return getattr(estimate, name)
+    except AttributeError:
+        raise UsageError(
+            f"the estimate has no {name!r}", next_step=f"run the filter with {name!r} in outputs"
+        ) from None
 
 
 def elements(names: tuple[str, ...], of: str) -> list[int]:
@@ -98,11 +110,11 @@ def nees(estimate: Estimate, truth: Truth) -> Array:
 
     Infinite where P is not positive definite.
     """
-    error = estimate.mean - truth.states
+    error = errors(estimate, truth)
     runs, scans, n = error.shape
     kernel = _nees_kernel(n)
     none = pack_states(kernel.program.state, {"unused": np.zeros(runs)})
-    values = {"error": error, "cov": estimate.cov}
+    values = {"error": error, "cov": _output(estimate, "cov")}
     with np.errstate(all="ignore"):
         square = kernel.run(none, values, scans)[1]["nees"]
     return np.where(np.isfinite(square), square, np.inf)
@@ -150,7 +162,7 @@ def anis(
         false_alarm: as in `anees`. Innovations of different scans are independent, so here the
             bounds are those of the average over runs and scans.
     """
-    square, dof = estimate.nis[:, scans], estimate.dof[:, scans]
+    square, dof = (_output(estimate, name)[:, scans] for name in ("nis", "dof"))
     square = np.where(np.isfinite(square), square, np.inf)
     total = float(np.sum(dof))
     low, high = chi_square_bounds(total, false_alarm)

@@ -6,19 +6,18 @@ of their own, so run 7 is the same run whatever the number of runs.
 """
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.experiments.formula import Formula
 from boresight.experiments.scenario import Scenario, lookup
 from boresight.filters.start import one_plot, two_plots
-from boresight.lanes import Kernel, Matrix, Rate, Vector, make_kernel, pack_states, trace
+from boresight.lanes import Matrix, Rate, Scalar, Vector
 from boresight.maths import Gaussian, wrap
 from boresight.maths.seeds import Stream, normals
 from boresight.models.motion import Motion
-from boresight.models.parameters import numbers, rate_of, structure, with_numbers
 from boresight.models.sensors import Sensor
 
 Array = Any
@@ -32,11 +31,13 @@ class Truth(NamedTuple):
         time_s: (scans,).
         states: (runs, scans, n).
         names: name of each state element, with its unit.
+        start: (runs, n), at time 0: that of the first scan, or one step before it.
     """
 
     time_s: Array
     states: Array
     names: tuple[str, ...]
+    start: Array
 
 
 class Plots(NamedTuple):
@@ -88,9 +89,10 @@ def simulate(
         return normals(seed, world.name, stream, shape, runs=runs, first=first)
 
     inputs = {"root": root, "pushes": draw(Stream.TRUTH, world.scans, root.shape[2])}
-    inputs |= {"dt": world.dt[0, :, None], "noise": draw(Stream.NOISE, world.scans, k)}
-    states, z = _run(world.motion, eye, np.broadcast_to(world.initial, (runs, n)), inputs)
-    truth = Truth(world.time_s, states, world.motion.names)
+    inputs |= {"dt": world.dt[0], "noise": draw(Stream.NOISE, world.scans, k)}
+    start = np.broadcast_to(world.initial, (runs, n))
+    states, z = _run(world.motion, eye, start, inputs)
+    truth = Truth(world.time_s, states, world.motion.names, start)
     return truth, _plots(world, eye, z, draw(Stream.START, n))
 
 
@@ -149,57 +151,32 @@ def _run(
     motion: Motion, sensor: Sensor, start: Array, inputs: Mapping[str, Array]
 ) -> tuple[Array, Array]:
     """States (runs, scans, n) and plots (runs, scans, k)."""
-    rated = {
-        name: rate_of(name, value, leaf)
-        for name, (value, leaf) in (numbers(motion, "motion") | numbers(sensor, "sensor")).items()
-    }
-    rates = tuple((name, rate) for name, (rate, _) in rated.items())
-    kernel = _kernel(_World(motion, sensor, inputs["root"].shape[2]), rates)
-    values = dict(inputs) | {name: value for name, (_, value) in rated.items()}
-    states = pack_states(kernel.program.state, {"state": start})
-    _, outputs = kernel.run(states, values, inputs["root"].shape[0])
+    (scans, n, rank), k = inputs["root"].shape, len(sensor.names)
+    formula = Formula(
+        step=_step,
+        motion=motion,
+        sensor=sensor,
+        state=(("state", Vector(n)),),
+        inputs=(
+            ("dt", Scalar(), Rate.STEP),
+            ("root", Matrix(n, rank), Rate.STEP),
+            ("pushes", Vector(rank), Rate.EACH),
+            ("noise", Vector(k), Rate.EACH),
+        ),
+        outputs=(("state", Vector(n)), ("z", Vector(k))),
+    )
+    outputs = formula.run({"state": start}, inputs, scans)
     return outputs["state"], outputs["z"]
 
 
-class _World:
-    """A motion and a sensor, equal when their formulas are."""
-
-    def __init__(self, motion: Motion, sensor: Sensor, rank: int) -> None:
-        self.motion, self.sensor, self.rank = motion, sensor, rank
-        self._identity = (structure(motion), structure(sensor), rank)
-
-    def __hash__(self) -> int:
-        return hash(self._identity)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _World) and self._identity == other._identity
-
-    def step(self, state: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[Any, Any]:
-        """The target moves and is seen: the formula that is recorded."""
-        values = dict(inputs)
-        motion = with_numbers(self.motion, "motion", values)
-        sensor = with_numbers(self.sensor, "sensor", values)
-        moved = motion.move(state["state"], inputs["dt"][0]) + inputs["root"] @ inputs["pushes"]
-        seen = [
-            (c, c.value(moved) + c.sigma * noise)
-            for c, noise in zip(sensor.components(motion), inputs["noise"], strict=True)
-        ]
-        z = np.array([wrap(value) if c.is_angle else value for c, value in seen])
-        return {"state": moved}, {"state": moved, "z": z}
-
-
-@lru_cache(maxsize=32)
-def _kernel(world: _World, rates: tuple[tuple[str, Rate], ...]) -> Kernel:
-    n, k = len(world.motion.names), len(world.sensor.names)
-    models = numbers(world.motion, "motion") | numbers(world.sensor, "sensor")
-    rate = dict(rates)
-    inputs = {"root": (Matrix(n, world.rank), Rate.STEP), "pushes": (Vector(world.rank), Rate.EACH)}
-    inputs |= {"dt": (Vector(1), Rate.STEP), "noise": (Vector(k), Rate.EACH)}
-    return make_kernel(
-        trace(
-            world.step,
-            state={"state": Vector(n)},
-            inputs=inputs | {name: (leaf, rate[name]) for name, (_, leaf) in models.items()},
-            outputs={"state": (Vector(n), Rate.EACH), "z": (Vector(k), Rate.EACH)},
-        )
-    )
+def _step(
+    motion: Motion, sensor: Sensor, state: Mapping[str, Any], inputs: Mapping[str, Any]
+) -> tuple[Any, Any]:
+    """The target moves and is seen."""
+    moved = motion.move(state["state"], inputs["dt"]) + inputs["root"] @ inputs["pushes"]
+    seen = [
+        (c, c.value(moved) + c.sigma * noise)
+        for c, noise in zip(sensor.components(motion), inputs["noise"], strict=True)
+    ]
+    z = np.array([wrap(value) if c.is_angle else value for c, value in seen])
+    return {"state": moved}, {"state": moved, "z": z}
