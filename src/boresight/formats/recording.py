@@ -82,7 +82,21 @@ def read_recording(
         else pl.DataFrame()
         for name, parts in found.items()
     }
-    return Recording(**tables, summary=summary.report(account))
+    report = summary.report(account)
+    if tables["reference"].height:
+        tables["reference"] = reference.with_jumps(tables["reference"])
+        report["notes"] += _jump_notes(tables["reference"])
+    return Recording(**tables, summary=report)
+
+
+def _jump_notes(table: "pl.DataFrame") -> list[str]:
+    jumps = int(table["position_jumps"].sum())
+    if not jumps:
+        return []
+    return [
+        f"{jumps} of {table.height} ADS-B reports place their aircraft where it cannot be: kept "
+        + "as recorded, marked position_jumps."
+    ]
 
 
 def inspect(

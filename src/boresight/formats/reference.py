@@ -28,6 +28,12 @@ _HEIGHT_IS_OVER = 0x7FFF
 _FRACTION_DAYS = (0, 1, -1, 0)  # FSI: the fraction belongs to this whole second, the next, the last
 
 
+# A position is compared with the median of this many around it, and may be so far from that.
+_AROUND = 11
+_ENOUGH = 5
+_FASTEST_MPS, _ROOM_M, _DEGREE_M = 500.0, 5_000.0, 111_195.0
+
+
 class _Quality(NamedTuple):
     code: Integers  # -1 where unknown
     kind: str
@@ -130,3 +136,28 @@ def _qualities(records: Records) -> list[_Quality]:
         _Quality(nucp, "nucp", _NUCP_M),
         _Quality(np.where(records.has("090/PA"), records.raw("090/PA", absent=-1), -1), "pa", None),
     ]
+
+
+def with_jumps(table: "pl.DataFrame") -> "pl.DataFrame":
+    """Add `position_jumps` to a reference sorted by time; positions stay as they are.
+
+    Only reports where it is false are fit to hold a radar against.
+    """
+    import polars as pl
+
+    latitude, longitude, time = pl.col("latitude_deg"), pl.col("longitude_deg"), pl.col("time_s")
+    # Counted from the aircraft's first longitude, so that 180 degrees are no jump.
+    east = (longitude - longitude.first() + 540) % 360 - 180
+    half = _AROUND // 2
+    span = pl.max_horizontal(
+        (time.shift(-half) - time).fill_null(time.max() - time),
+        (time - time.shift(half)).fill_null(time - time.min()),
+    )
+    north_m, east_m = (
+        (axis - axis.rolling_median(_AROUND, center=True, min_samples=1)) * _DEGREE_M
+        for axis in (latitude, east)
+    )
+    distance = (north_m**2 + (east_m * latitude.radians().cos()) ** 2).sqrt()
+    is_far = (distance > _ROOM_M + _FASTEST_MPS * span).over("address")
+    is_known = distance.is_not_null().sum().over("address") >= _ENOUGH
+    return table.with_columns(position_jumps=pl.when(is_known).then(is_far))

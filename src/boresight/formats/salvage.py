@@ -141,9 +141,9 @@ def _rescue(
         codes = sources(part.octets, starts)
         for code in np.unique(codes).tolist():
             mine = codes == code
-            if category << 16 | code in account.good:
-                edition = account.editions[category, code].edition
-                records = _whole(part, starts[mine], ends[mine], edition)
+            choice = account.editions.get((category, code))
+            if choice is not None and category << 16 | code in account.good:
+                records = _whole(part, starts[mine], ends[mine], choice.edition)
                 chosen = np.unique(records.block)
                 found = starts[mine][chosen].tolist(), ends[mine][chosen].tolist()
                 spans += zip(*found, strict=True)
