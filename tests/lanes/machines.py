@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from boresight.lanes import Kernel, Rate, Scalar, Vector, pack_states, simd, trace
-from boresight.lanes.ir import Shape
+from boresight.lanes.writer import Shape
 
 
 def _runs_here(goal):

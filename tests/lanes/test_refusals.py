@@ -1,4 +1,4 @@
-"""What cannot be recorded is refused where it stands: file, line and cure, never a wrong program."""
+"""What cannot be recorded is refused where it stands: file, line, cure; never a wrong program."""
 
 # Formulas here take (s, v, A) whether they use them or not, and are bad style on purpose.
 # ruff: noqa: ARG001, ARG005, FURB110, FURB192, PLR0124, RUF015

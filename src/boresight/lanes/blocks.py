@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.lanes.interpreter import run_numpy
 from boresight.lanes.ir import BLOCK
-from boresight.lanes.program import Program, Rate, Slot, run_numpy
+from boresight.lanes.program import Program, Rate, Slot
 from boresight.lanes.simd import Code, compile_program
 
 Array = Any

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from boresight.lanes.trace import Symbol, forbid, recorded_power
+from boresight.lanes.refusals import forbid
+from boresight.lanes.trace import Symbol, recorded_power
 
 Array = Any  # float64 outside a trace, object (symbols) inside one
 

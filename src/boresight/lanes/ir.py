@@ -18,142 +18,13 @@ Floating-point flag `contract` only: multiply and add may fuse, NaN and infinity
 every lane sees the same operations, so one lane and a million give the same bits.
 """
 
-from dataclasses import dataclass
-
-from boresight.lanes.program import Program, Rate, Slot, is_condition
+from boresight.lanes.program import Program, Rate, Slot
+from boresight.lanes.writer import Shape, Writer
 
 BLOCK = 8  # lanes of one block in memory, whatever the processor
-_BINARY = {"add": "fadd contract", "sub": "fsub contract", "mul": "fmul contract"}
-_BINARY |= {"div": "fdiv contract", "scale": "fmul"}  # a scaled half turn must stay one: no fusing
-_CALLS = {"sqrt": "sqrt", "abs": "fabs", "rint": "rint", "floor": "floor", "copysign": "copysign"}
-_CONDITIONS = {"lt": "fcmp olt", "le": "fcmp ole", "isnan": "fcmp uno"}
-_LOGIC = {"and": "and", "or": "or"}
 
 
-@dataclass(frozen=True)
-class Shape:
-    """What the code is generated for: lanes in one instruction, and the layout of its data."""
-
-    width: int
-    rows: bool
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """LLVM's names for the types of one rate: scalars, or vectors of W lanes."""
-
-    number: str
-    integer: str
-    bit: str
-    suffix: str
-
-
-def _vector(width: int) -> _Kind:
-    return _Kind(f"<{width} x double>", f"<{width} x i64>", f"<{width} x i1>", f"v{width}")
-
-
-_SCALAR = _Kind("double", "i64", "i1", "")
-
-
-class _Writer:
-    """Lines of one function, with names for the values already computed."""
-
-    def __init__(self, program: Program, shape: Shape) -> None:
-        self.program, self.shape = program, shape
-        self.lines: list[str] = []
-        self.vector = _vector(shape.width)
-        self.splats: dict[int, str] = {}
-        self.temporaries = 0
-        self.kinds = [self.vector if rate & Rate.LANE else _SCALAR for rate in program.rates]
-        self.elements: dict[str, list[tuple[int, int]]] = {}  # of an input: (element, node)
-        for node, (op, args) in enumerate(program.nodes):
-            if op == "input":
-                self.elements.setdefault(args[0], []).append((args[1], node))
-
-    def emit(self, text: str) -> str:
-        self.temporaries += 1
-        name = f"%t{self.temporaries}"
-        self.lines.append(f"  {name} = {text}")
-        return name
-
-    def line(self, text: str) -> None:
-        self.lines.append(text)
-
-    def constant(self, value: str, kind: _Kind, scalar: str = "double") -> str:
-        return value if kind is _SCALAR else f"splat ({scalar} {value})"
-
-    def value(self, node: int, kind: _Kind) -> str:
-        """Operand text of a node, splatted if a scalar meets a vector instruction."""
-        op, args = self.program.nodes[node]
-        if op == "const":
-            bits = int.from_bytes(args[0], "little")
-            return self.constant(f"0x{bits:016X}", kind)
-        if kind is _SCALAR or self.kinds[node] is kind:
-            return f"%n{node}"
-        if node not in self.splats:
-            self.splats[node] = self.splat(f"%n{node}", "i1" if is_condition(op) else "double")
-        return self.splats[node]
-
-    def splat(self, scalar: str, element: str) -> str:
-        w = self.shape.width
-        first = self.emit(f"insertelement <{w} x {element}> poison, {element} {scalar}, i64 0")
-        kind = f"<{w} x {element}>"
-        return self.emit(
-            f"shufflevector {kind} {first}, {kind} poison, <{w} x i32> zeroinitializer"
-        )
-
-    def compute(self, wanted: Rate) -> None:
-        """Emit every operation of one rate, in recorded order."""
-        for node, ((op, args), rate) in enumerate(
-            zip(self.program.nodes, self.program.rates, strict=True)
-        ):
-            if rate is wanted and op not in ("const", "input"):
-                kind = self.kinds[node]
-                self.line(f"  %n{node} = {self.operation(op, args, kind)}")
-
-    def operation(self, op: str, args: tuple[int, ...], kind: _Kind) -> str:
-        x = [self.value(a, kind) for a in args]
-        if op in _BINARY:
-            return f"{_BINARY[op]} {kind.number} {x[0]}, {x[1]}"
-        if op == "neg":
-            return f"fneg {kind.number} {x[0]}"
-        if op in _CALLS:
-            operands = ", ".join(f"{kind.number} {a}" for a in x)
-            return f"call {kind.number} @llvm.{_CALLS[op]}.{kind.suffix}f64({operands})"
-        if op in _CONDITIONS:
-            return f"{_CONDITIONS[op]} {kind.number} {x[0]}, {x[-1]}"
-        if op in _LOGIC:
-            return f"{_LOGIC[op]} {kind.bit} {x[0]}, {x[1]}"
-        if op == "not":
-            return f"xor {kind.bit} {x[0]}, {self.constant('true', kind, 'i1')}"
-        if op == "select":
-            return f"select {kind.bit} {x[0]}, {kind.number} {x[1]}, {kind.number} {x[2]}"
-        return self.bits(op, x[0], kind)
-
-    def bits(self, op: str, x: str, kind: _Kind) -> str:
-        """Operations on the exponent bits, for whole numbers in range; see elementary.py."""
-
-        def c(value: int) -> str:
-            return self.constant(str(value), kind, "i64")
-
-        if op == "pow2":  # adding 2**52 + 1023 leaves x + 1023 in the low bits: no conversion
-            magic = self.constant("0x43300000000003FF", kind)
-            low = self.emit(f"fadd {kind.number} {x}, {magic}")
-            whole = self.emit(f"bitcast {kind.number} {low} to {kind.integer}")
-            shifted = self.emit(f"shl {kind.integer} {whole}, {c(52)}")
-            return f"bitcast {kind.integer} {shifted} to {kind.number}"
-        whole = self.emit(f"bitcast {kind.number} {x} to {kind.integer}")
-        if op == "mantissa":
-            low = self.emit(f"and {kind.integer} {whole}, {c(0x000FFFFFFFFFFFFF)}")
-            one = self.emit(f"or {kind.integer} {low}, {c(0x3FF0000000000000)}")
-            return f"bitcast {kind.integer} {one} to {kind.number}"
-        exponent = self.emit(f"lshr {kind.integer} {whole}, {c(52)}")
-        biased = self.emit(f"or {kind.integer} {exponent}, {c(0x4330000000000000)}")
-        number = self.emit(f"bitcast {kind.integer} {biased} to {kind.number}")
-        return f"fsub {kind.number} {number}, {self.constant('0x43300000000003FF', kind)}"
-
-
-def _scalar_loads(w: _Writer, slot: Slot, argument: str, base: str) -> None:
+def _scalar_loads(w: Writer, slot: Slot, argument: str, base: str) -> None:
     """Numbers the lanes share: FIXED and STEP inputs."""
     for k, node in w.elements.get(slot.name, ()):
         index = w.emit(f"add i64 {base}, {k}")
@@ -161,7 +32,7 @@ def _scalar_loads(w: _Writer, slot: Slot, argument: str, base: str) -> None:
         w.line(f"  %n{node} = load double, ptr {pointer}, align 8")
 
 
-def _address(w: _Writer, argument: str, base: str, element: int) -> str:
+def _address(w: Writer, argument: str, base: str, element: int) -> str:
     """Pointer (blocked) or pointers (rows) of one number of the W lanes."""
     if not w.shape.rows:
         index = w.emit(f"add i64 {base}, {element * BLOCK}")
@@ -170,7 +41,7 @@ def _address(w: _Writer, argument: str, base: str, element: int) -> str:
     return w.emit(f"getelementptr double, <{width} x ptr> {base}, i64 {element}")
 
 
-def _load(w: _Writer, argument: str, base: str, element: int) -> str:
+def _load(w: Writer, argument: str, base: str, element: int) -> str:
     address, kind = _address(w, argument, base, element), w.vector
     if not w.shape.rows:
         return f"load {kind.number}, ptr {address}, align 8"
@@ -181,7 +52,7 @@ def _load(w: _Writer, argument: str, base: str, element: int) -> str:
     )
 
 
-def _store(w: _Writer, argument: str, base: str, element: int, value: str) -> None:
+def _store(w: Writer, argument: str, base: str, element: int, value: str) -> None:
     address, kind = _address(w, argument, base, element), w.vector
     if not w.shape.rows:
         w.line(f"  store {kind.number} {value}, ptr {address}, align 8")
@@ -193,7 +64,7 @@ def _store(w: _Writer, argument: str, base: str, element: int, value: str) -> No
     )
 
 
-def _lane_base(w: _Writer, argument: str, size: int, steps: str) -> str:
+def _lane_base(w: Writer, argument: str, size: int, steps: str) -> str:
     """Where the data of this chunk's lanes begin in an argument of `size` numbers a step."""
     numbers = w.emit(f"mul i64 {steps}, {size}")
     if not w.shape.rows:
@@ -204,7 +75,7 @@ def _lane_base(w: _Writer, argument: str, size: int, steps: str) -> str:
     return w.emit(f"getelementptr double, ptr {argument}, {w.vector.integer} {offsets}")
 
 
-def _step_base(w: _Writer, base: str, size: int) -> str:
+def _step_base(w: Writer, base: str, size: int) -> str:
     """`base` moved to step %t."""
     if not w.shape.rows:
         moved = w.emit(f"mul i64 %t, {size * BLOCK}")
@@ -222,17 +93,17 @@ def _state_offset(program: Program, name: str) -> int:
     raise KeyError(name)
 
 
-def _state_base(w: _Writer) -> str:
+def _state_base(w: Writer) -> str:
     start = w.emit(f"mul i64 %block, {w.program.state_size * BLOCK}")
     return w.emit(f"add i64 {start}, %inside")
 
 
-def _state_pointer(w: _Writer, argument: str, base: str, element: int) -> str:
+def _state_pointer(w: Writer, argument: str, base: str, element: int) -> str:
     index = w.emit(f"add i64 {base}, {element * BLOCK}")
     return w.emit(f"getelementptr double, ptr {argument}, i64 {index}")
 
 
-def _chunk_places(w: _Writer) -> None:
+def _chunk_places(w: Writer) -> None:
     """Block, place inside it, and (for rows) the lanes of this chunk; the last lane pads."""
     width = w.shape.width
     w.line(f"  %block = udiv i64 %chunk, {BLOCK // width}")
@@ -247,7 +118,7 @@ def _chunk_places(w: _Writer) -> None:
         w.line(f"  %lane = {call}({w.vector.integer} {lane}, {w.vector.integer} {last})")
 
 
-def _unpack_frame(w: _Writer, arrays: list[str]) -> None:
+def _unpack_frame(w: Writer, arrays: list[str]) -> None:
     """The words of a call: first chunk and the one after the last, steps, lanes, addresses."""
     kinds = dict.fromkeys(("%from", "%to", "%steps", "%lanes"), "i64")
     kinds |= dict.fromkeys(("%old", "%new", *arrays), "ptr")
@@ -265,7 +136,7 @@ def write_ir(program: Program, shape: Shape, name: str, attributes: str) -> str:
         name: symbol to export.
         attributes: function attributes of the target.
     """
-    w = _Writer(program, shape)
+    w = Writer(program, shape)
     arguments = [f"%in{i}" for i in range(len(program.inputs))]
     results = [f"%out{i}" for i in range(len(program.outputs))]
     w.line(f"define void @{name}(ptr %frame) {attributes} {{\nentry:")
@@ -300,7 +171,7 @@ def write_ir(program: Program, shape: Shape, name: str, attributes: str) -> str:
     return "\n".join(w.lines)
 
 
-def _precompute_splats(w: _Writer, rate: Rate) -> None:
+def _precompute_splats(w: Writer, rate: Rate) -> None:
     """Splat shared numbers where they are computed, so that every later use is dominated."""
     users = {
         a
@@ -315,7 +186,7 @@ def _precompute_splats(w: _Writer, rate: Rate) -> None:
 
 
 def _write_lane_part(
-    w: _Writer, slots: list[tuple[Slot, str]]
+    w: Writer, slots: list[tuple[Slot, str]]
 ) -> tuple[dict[int, str], dict[str, str]]:
     base = _state_base(w)
     old: dict[int, str] = {}
@@ -337,7 +208,7 @@ def _write_lane_part(
 
 
 def _write_step(
-    w: _Writer, slots: list[tuple[Slot, str]], old: dict[int, str], bases: dict[str, str]
+    w: Writer, slots: list[tuple[Slot, str]], old: dict[int, str], bases: dict[str, str]
 ) -> None:
     top = len(w.lines)
     for slot, argument in slots:
@@ -354,7 +225,7 @@ def _write_step(
     w.lines[top:top] = _carried(w, old)
 
 
-def _carried(w: _Writer, old: dict[int, str]) -> list[str]:
+def _carried(w: Writer, old: dict[int, str]) -> list[str]:
     """The state inside the loop: from memory on the first step, then from the step before."""
     lines, element = [], 0
     for slot in w.program.state:
@@ -366,7 +237,7 @@ def _carried(w: _Writer, old: dict[int, str]) -> list[str]:
     return lines
 
 
-def _write_outputs(w: _Writer, results: list[str], bases: list[str], rate: Rate) -> None:
+def _write_outputs(w: Writer, results: list[str], bases: list[str], rate: Rate) -> None:
     for slot, numbers, argument, base in zip(
         w.program.outputs, w.program.output_nodes, results, bases, strict=True
     ):

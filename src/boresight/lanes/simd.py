@@ -20,8 +20,9 @@ from typing import Any
 
 from boresight.errors import UsageError
 from boresight.lanes.elementary import lower
-from boresight.lanes.ir import BLOCK, Shape, write_ir
+from boresight.lanes.ir import BLOCK, write_ir
 from boresight.lanes.program import Program
+from boresight.lanes.writer import Shape
 
 FORMAT = 2  # of the calling convention; part of every cached object's name
 _LOCK = threading.RLock()  # LLVM's contexts are not made for several threads

@@ -8,16 +8,13 @@ Structural zeros are folded: `0 * x` is 0 even where x might be NaN or infinite.
 six-state filter has twice the operations; with it, a formula must not rely on `0 * nan`.
 """
 
-import os
 import struct
-import sys
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
-from boresight.errors import FormulaError
+from boresight.lanes.refusals import forbid, refuse
 
 # Operations that only a boolean results from; everything else is a float.
 COMPARISONS = frozenset({"lt", "le", "isnan", "and", "or", "not"})
@@ -25,9 +22,6 @@ _LOGIC = frozenset({"and", "or", "not"})  # of conditions; the other comparisons
 _COMMUTE = frozenset({"add", "mul", "and", "or"})
 _ARITHMETIC = frozenset({"add", "sub", "mul", "div"})
 _UNITS = (1.0, -1.0)
-_INNER = (f"{Path(__file__).parent}{os.sep}", f"{Path(np.__file__).parent}{os.sep}", "<frozen")
-_STDLIB = str(Path(os.__file__).parent)
-
 FOLD: dict[str, Callable[..., Any]] = {
     "add": np.add,
     "sub": np.subtract,
@@ -58,28 +52,6 @@ FOLD: dict[str, Callable[..., Any]] = {
 }
 
 
-def _is_inner(file: str) -> bool:
-    """Whether a file is ours, NumPy's or Python's: not where the formula stands."""
-    return file.startswith(_INNER) or os.path.dirname(file) == _STDLIB  # noqa: PTH120 - a string
-
-
-def _place() -> str:
-    """File and line of the formula: the innermost frame that is not ours, NumPy's or Python's."""
-    frame = sys._getframe(1)  # noqa: SLF001 - the only way to name the caller's line cheaply
-    while frame.f_back and _is_inner(frame.f_code.co_filename):
-        frame = frame.f_back
-    return f"{frame.f_code.co_filename}, line {frame.f_lineno}"
-
-
-def _refuse(what: str, cure: str) -> NoReturn:
-    raise FormulaError(
-        f"a formula cannot be recorded: {what}",
-        where=_place(),
-        why="a recorded formula runs for many targets at once, so it cannot look at one value",
-        next_step=cure,
-    )
-
-
 class Graph:
     """The operations of one trace, each recorded once (equal operations are shared)."""
 
@@ -100,7 +72,7 @@ class Graph:
         """`value` as a symbol of this trace; None if it is no number (an array, a dual number)."""
         if isinstance(value, Symbol):
             if value.graph is not self:
-                _refuse("it mixes symbols of two traces", "pass the value in as a declared input")
+                refuse("it mixes symbols of two traces", "pass the value in as a declared input")
             return value
         if isinstance(value, int | float | np.floating | np.integer):
             return self.constant(float(value))
@@ -138,8 +110,8 @@ class Graph:
             if is_condition is (op in _LOGIC or (op == "select" and position == 0)):
                 continue
             if is_condition:
-                _refuse("it calculates with a condition", "use select(condition, 1.0, 0.0)")
-            _refuse("it takes a number for a condition", "compare it first, as in x < 0.0")
+                refuse("it calculates with a condition", "use select(condition, 1.0, 0.0)")
+            refuse("it takes a number for a condition", "compare it first, as in x < 0.0")
 
     def _simplify(self, op: str, args: tuple["Symbol", ...]) -> "Symbol | None":
         if op in _ARITHMETIC:
@@ -219,7 +191,7 @@ class Symbol:
     def _lifted(self, other: Any, name: str) -> "Symbol":
         symbol = self.lift(other)
         if symbol is None:
-            _refuse(f"np.{name} with {type(other).__name__}", "pass floats or recorded numbers")
+            refuse(f"np.{name} with {type(other).__name__}", "pass floats or recorded numbers")
         return symbol
 
     __add__, __radd__ = _operator("add"), _reflected("add")
@@ -270,7 +242,7 @@ def recorded_power(base: Any, power: Any) -> Any:
         return integer_power(base, int(power))
     if isinstance(power, float) and power == 0.5:
         return base.sqrt()
-    return _refuse(f"power {power!r}", "write it with sqrt, exp and log")
+    return refuse(f"power {power!r}", "write it with sqrt, exp and log")
 
 
 def integer_power(base: Any, power: int) -> Any:
@@ -284,70 +256,4 @@ def integer_power(base: Any, power: int) -> Any:
     return square * base if half is not None and power % 2 else square
 
 
-_FORBIDDEN = (
-    (
-        "__bool__",
-        "it branches on a value (if, and, or, min, max, np.where, sort, ...)",
-        "use boresight.maths.select(condition, a, b)",
-    ),
-    (
-        "__float__ __int__ __index__ __complex__ __trunc__",
-        "it turns a recorded number into a Python number ({}), as math.* and float arrays do",
-        "use NumPy functions, and build arrays with np.array, np.block or np.eye(n) * x",
-    ),
-    ("__eq__ __ne__", "it compares for equality", "use <, <= and boresight.maths.select"),
-    (
-        "__mod__ __rmod__ __floordiv__ __rfloordiv__ __divmod__ __rdivmod__ __round__",
-        "it uses {}",
-        "use boresight.maths.wrap, or np.rint and np.floor",
-    ),
-    ("__rpow__", "it has a recorded number as exponent", "write it with np.exp and np.log"),
-    (
-        "__reduce__ __reduce_ex__ __copy__ __deepcopy__",
-        "it copies or pickles a recorded number",
-        "keep symbols inside the formula",
-    ),
-    (
-        """tan arcsin arccos arctan sinh cosh tanh arcsinh arccosh arctanh log1p log2 log10 expm1
-        exp2 cbrt ceil __ceil__ trunc deg2rad rad2deg degrees radians""",
-        "np.{} has no recorded form",
-        "write it with sqrt, exp, log, sin, cos, arctan2, rint and floor",
-    ),
-)
-
-
-def forbid(kind: type) -> None:
-    """Make a class of numbers raise `FormulaError` for all that cannot be recorded."""
-    for names, what, cure in _FORBIDDEN:
-        for name in names.split():
-
-            def refuse(
-                self: Any,
-                *args: Any,
-                _what: str = what.format(name.strip("_")),
-                _cure: str = cure,
-                **kwargs: Any,
-            ) -> NoReturn:
-                del self, args, kwargs
-                _refuse(_what, _cure)
-
-            setattr(kind, name, refuse)
-
-
 forbid(Symbol)
-
-
-def located(error: BaseException) -> FormulaError:
-    """A `FormulaError` for what NumPy itself raised on symbols, at the formula's own line."""
-    place, step = "", error.__traceback__
-    while step:
-        name = step.tb_frame.f_code.co_filename
-        if not _is_inner(name):
-            place = f"{name}, line {step.tb_lineno}"
-        step = step.tb_next
-    return FormulaError(
-        f"a formula cannot be recorded: {error}",
-        where=place,
-        why=f"NumPy raised {type(error).__name__} on recorded numbers",
-        next_step="use +, -, *, /, @, sqrt, exp, log, sin, cos, arctan2 and boresight.maths",
-    )
