@@ -289,7 +289,8 @@ def test_the_verdict_follows_the_figures(result):
     assert judged(1.02, 0.8).mark == "good"
     assert judged(2.25, 1.8).mark == "attention"
     assert "1.50 times what the filter states, it is too confident" in judged(2.25, 1.8).html
-    assert "too cautious" in judged(0.25, 0.2).html
+    assert "too cautious" in judged(0.6, 0.56).html
+    assert judged(0.6, 0.56).mark == "attention"
     assert "a few much larger" in judged(1.02, 0.3).html
     assert judged(1.02, 0.3).mark == "attention"
 
