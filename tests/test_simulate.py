@@ -201,9 +201,19 @@ def test_a_start_from_plots_uses_them_once(begin, used):
     assert np.all(np.isfinite(found.mean))
 
 
-def test_an_unknown_start_is_refused():
-    with pytest.raises(UsageError, match="begin='somehow'"):
-        simulate(replace(lookup("kashyap-set-1"), begin="somehow"), runs=1, seed=1)
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"begin": "somehow"}, "begin='somehow'"),
+        ({"initial": [1.0, 2.0]}, r"initial .* shape \(2,\)"),
+        ({"prior_cov": np.eye(4)}, "prior_cov"),
+        ({"scans": 0}, "scans=0"),
+        ({"dt_s": -1.0}, "dt_s=-1.0"),
+    ],
+)
+def test_a_scenario_that_cannot_be_is_refused(wrong, message):
+    with pytest.raises(UsageError, match=message):
+        replace(lookup("kashyap-set-1"), **wrong)
 
 
 def test_a_cell_is_simulated_and_filtered_and_does_not_depend_on_threads():

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from importlib import resources
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -56,6 +56,25 @@ class Scenario:
     length_unit: str = "m"
     source: str = ""
 
+    def __post_init__(self) -> None:
+        """Lists become arrays, and what cannot be simulated is refused."""
+        n = len(self.motion.names)
+        for name, shape in (("initial", (n,)), ("prior_cov", (n, n))):
+            array = np.asarray(getattr(self, name), dtype=float)
+            object.__setattr__(self, name, array)
+            if array.shape != shape:
+                raise UsageError(
+                    f"{name} of scenario {self.name!r} has shape {array.shape}",
+                    why=f"the motion's state is {', '.join(self.motion.names)}",
+                )
+        if self.begin not in get_args(Begin):
+            raise UsageError(
+                f"begin={self.begin!r} of scenario {self.name!r} is not a way to begin",
+                next_step=f"use {', '.join(get_args(Begin))}",
+            )
+        if self.scans < 1 or not self.dt_s > 0:
+            raise UsageError(f"scenario {self.name!r} has scans={self.scans}, dt_s={self.dt_s}")
+
     @property
     def prior(self) -> Gaussian:
         """What a filter knows before the first plot."""
@@ -87,7 +106,7 @@ def _kashyap(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
         name=name,
         motion=ConstantVelocity(accel_mps2=common["accel_variance_m2ps4"] ** 0.5, dims=dims),
         sensor=Radar(**own["sigma"]),
-        initial=np.array(own["initial"]),
+        initial=own["initial"],
         prior_cov=np.diag(np.square(spread)),
         begin=common["begin"],
         dt_s=common["dt_s"],
@@ -106,7 +125,7 @@ def _aditya(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
         name=name,
         motion=SphericalUnitRate(position_noise=noise, velocity_noise=noise),
         sensor=Radar(range_m=sigmas[0], azimuth_deg=azimuth_deg, elevation_deg=elevation_deg),
-        initial=np.array(printed["initial"]),
+        initial=printed["initial"],
         prior_cov=printed["P0"] * np.eye(len(printed["initial"])),
         begin=assumed["begin"],
         dt_s=printed["dt_s"],

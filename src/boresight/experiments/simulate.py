@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boresight.errors import UsageError
 from boresight.experiments.formula import Formula
 from boresight.experiments.scenario import Scenario, lookup
 from boresight.filters.start import one_plot, two_plots
@@ -106,13 +105,9 @@ def _plots(world: Scenario, sensor: Sensor, z: Array, normal: Array) -> Plots:
     elif world.begin == "one plot":
         prior = one_plot(z[:, 0], world.motion, sensor)
         z, dt = _spent(z, dt, 1)
-    elif world.begin == "two plots":
+    else:
         prior = two_plots(z[:, 0], z[:, 1], dt[0, 1], world.motion, sensor)
         z, dt = _spent(z, dt, 2)
-    else:
-        raise UsageError(
-            f"begin={world.begin!r}", next_step="use random draw, given, one plot or two plots"
-        )
     return Plots(world.time_s, z, dt, prior)
 
 
