@@ -149,6 +149,11 @@ def test_figures_and_their_numbers_are_written(tmp_path):
     numbers = np.array(rows[1:], dtype=float)
     assert numbers[:, 1] == pytest.approx(one.truth.states[0, :, 0])
     assert numbers[:, 3] == pytest.approx(one.estimates["mekf"].mean[0, :, 0])
+    velocity = np.loadtxt(tmp_path / "made" / "AD-F7.csv", delimiter=",", skiprows=1)
+    assert velocity[:, 2] == pytest.approx(one.estimates["ekf"].mean[0, :, 5])
+    errors = np.loadtxt(tmp_path / "made" / "AD-F8.csv", delimiter=",", skiprows=1)
+    mekf = np.abs(one.estimates["mekf"].mean - one.truth.states)[0]
+    assert errors[:, 2::2] == pytest.approx(mekf, abs=1e-8)
 
 
 def test_no_figures_unless_asked_for(aditya):

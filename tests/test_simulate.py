@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from boresight.errors import UsageError
+from boresight.experiments.formula import Formula
 from boresight.experiments.montecarlo import filtered, run_cell
 from boresight.experiments.scenario import lookup, scenario_names
 from boresight.experiments.simulate import root_of, simulate
+from boresight.lanes import Scalar
 from boresight.maths.seeds import Stream, normals
 from boresight.models.motion import ConstantVelocity, Static
 from boresight.models.sensors import PositionSensor, Radar
@@ -214,6 +216,24 @@ def test_a_start_from_plots_uses_them_once(begin, used):
 def test_a_scenario_that_cannot_be_is_refused(wrong, message):
     with pytest.raises(UsageError, match=message):
         replace(lookup("kashyap-set-1"), **wrong)
+
+
+def test_formulas_of_the_same_shapes_are_told_apart():
+    world = lookup("kashyap-set-2")
+    shapes = {
+        "motion": world.motion,
+        "sensor": world.sensor,
+        "state": (("x", Scalar()),),
+        "inputs": (),
+        "outputs": (("x", Scalar()),),
+    }
+    up, down = (
+        Formula(step=lambda m, s, x, i, d=d: ({"x": x["x"] + d}, {"x": x["x"] + d}), **shapes)
+        for d in (1.0, -1.0)
+    )
+    start = {"x": np.zeros(2)}
+    assert up.run(start, {}, 3)["x"].tolist() == [[1.0, 2.0, 3.0]] * 2
+    assert down.run(start, {}, 3)["x"].tolist() == [[-1.0, -2.0, -3.0]] * 2
 
 
 def test_a_cell_is_simulated_and_filtered_and_does_not_depend_on_threads():
