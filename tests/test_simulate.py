@@ -228,7 +228,7 @@ def test_formulas_of_the_same_shapes_are_told_apart():
         "outputs": (("x", Scalar()),),
     }
     up, down = (
-        Formula(step=lambda m, s, x, i, d=d: ({"x": x["x"] + d}, {"x": x["x"] + d}), **shapes)
+        Formula(step=lambda _m, _s, x, _i, d=d: ({"x": x["x"] + d},) * 2, **shapes)
         for d in (1.0, -1.0)
     )
     start = {"x": np.zeros(2)}
