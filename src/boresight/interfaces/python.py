@@ -14,8 +14,9 @@ from boresight.filters.start import one_plot
 from boresight.filters.stream import Stream
 from boresight.maths import Gaussian
 from boresight.maths.frames import Site
+from boresight.models.atmosphere import Atmosphere
 from boresight.models.motion import Motion
-from boresight.models.sensors import Sensor
+from boresight.models.sensors import Radar, Sensor
 
 if TYPE_CHECKING:
     import polars as pl
@@ -66,6 +67,8 @@ def run(
     steps = getattr(plots, "dt", None) if dt is None else dt
     if steps is None:
         raise UsageError("the plots carry no dt", next_step="pass dt= in seconds")
+    if isinstance(sensor, Radar):
+        z = sensor.without_air(z)
     recursion = catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor)
     prior = getattr(plots, "prior", None) if start is None else start
     if prior is None:
@@ -134,6 +137,7 @@ def track(
     site: Site | tuple[float, float, float] | None = None,
     sensor: str | None = None,
     filter: str = "mekf",  # noqa: A002 - the field's word
+    atmosphere: Atmosphere | None = None,
 ) -> "TrackingResult":
     """Tracks of every identified target of one radar.
 
@@ -142,6 +146,8 @@ def track(
         site: of the radar: latitude and longitude in degrees, height above the ellipsoid in m.
         sensor: "SAC/SIC", if the plots are of several.
         filter: of the catalogue.
+        atmosphere: the air whose delay is taken out of the ranges, such as
+            `ExponentialAtmosphere()`; None for none.
     """
     from boresight.tracking.tracker import track as track_plots
 
@@ -149,7 +155,8 @@ def track(
     if place is not None and not isinstance(place, Site):
         latitude, longitude, height = place
         place = Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
-    return track_plots(plots, site=place, sensor=sensor, filter=catalogue.lookup(filter))
+    chosen = catalogue.lookup(filter)
+    return track_plots(plots, site=place, sensor=sensor, filter=chosen, atmosphere=atmosphere)
 
 
 def report(tracks: "TrackingResult", **about: Any) -> "Report":

@@ -7,17 +7,20 @@ A plot is an array (k,), SI units and radians, NaN where a component was not mea
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 
 from boresight.errors import UsageError
 from boresight.maths.frames import Site, ellipsoid_height
+from boresight.models.atmosphere import EARTH_M, Atmosphere
 from boresight.models.components import FORMULAS, Component
 from boresight.models.motion import OFFSET, Motion
 
 Array = Any
 _RADIANS = np.pi / 180.0
+_ROUNDS = 4  # of taking the air's effect out: each leaves a tenth of the error
 _SIGMAS = (
     "range_m",
     "azimuth_deg",
@@ -69,8 +72,10 @@ class Radar:
             height by an offset that weather makes; a motion `WithHeightOffset` carries that.
         range_rate_mps: range rate, m/s, positive when opening.
         pose: None for a fixed radar at the origin of the track frame, along its axes.
-        site: place of the track frame's origin; needed only for `height_m`. The frame is then
-            x = North, y = East, z = up.
+        site: place of the track frame's origin; needed for heights and for the atmosphere. The
+            frame is then x = North, y = East, z = up.
+        atmosphere: the air between radar and target; None for a vacuum. Formulas are those of
+            straight lines: `without_air` takes its effect out of plots before they are filtered.
     """
 
     range_m: Any = None
@@ -81,6 +86,7 @@ class Radar:
     range_rate_mps: Any = None
     pose: Pose | None = None
     site: Site | None = None
+    atmosphere: Atmosphere | None = None
 
     def __post_init__(self) -> None:
         """Numbers become floats or arrays, and are checked."""
@@ -88,9 +94,10 @@ class Radar:
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _sigma(name, value))
-        if self.site is None and not (self.height_m is None and self.pressure_altitude_m is None):
+        told = (self.height_m, self.pressure_altitude_m, self.atmosphere)
+        if self.site is None and any(each is not None for each in told):
             raise UsageError(
-                "a radar that is told heights needs a site",
+                "a radar that is told heights, or looks through air, needs a site",
                 why="height above the ellipsoid depends on where the frame's origin is",
                 next_step="pass site=Site(latitude_deg=..., longitude_deg=..., height_m=...)",
             )
@@ -136,6 +143,37 @@ class Radar:
             turn @ (v - self.pose.velocity_mps[:dims]),
         )
 
+    def without_air(self, z: Array) -> Array:
+        """Plots (..., k) as they would be in a vacuum: group delay and bending taken out.
+
+        The air's effect is taken where the plot says the target is (range with altitude or
+        elevation), and again where it then is; a plot that tells no height keeps its range.
+        """
+        if self.atmosphere is None or self.site is None:
+            return z
+        names, clear = self.names, np.array(z, dtype=float)
+        effects = {"range_m": self.atmosphere.excess_range}
+        effects["elevation_rad"] = self.atmosphere.bending
+        for _ in range(_ROUNDS):
+            place = (clear[..., names.index("range_m")], self._told_height(clear))
+            for i, name in enumerate(names):
+                if name in effects:
+                    effect = effects[name](*place, self.site.height_m)
+                    clear[..., i] = z[..., i] - np.nan_to_num(effect)
+        return clear
+
+    def _told_height(self, z: Array) -> Array:
+        """Height above the ellipsoid, m, as the plots tell it; NaN where they do not."""
+        columns = dict(zip(self.names, np.moveaxis(z, -1, 0), strict=True))
+        for name in ("height_m", "pressure_altitude_m"):
+            if name in columns:
+                return columns[name]
+        if "elevation_rad" not in columns:
+            return np.full(z.shape[:-1], np.nan)
+        r, el = columns["range_m"], columns["elevation_rad"]
+        start = EARTH_M + self.site.height_m  # type: ignore[union-attr]
+        return np.sqrt(start**2 + r**2 + 2 * start * r * np.sin(el)) - EARTH_M
+
     def _height(self, name: str, motion: Motion) -> Callable[[Array], Any]:
         has_offset = name == "pressure_altitude_m" and OFFSET in motion.names
 
@@ -145,6 +183,10 @@ class Radar:
             return height + state[motion.names.index(OFFSET)] if has_offset else height
 
         return value
+
+
+def _coordinate(i: int, state: Array) -> Any:
+    return state[i]
 
 
 def _sigma(name: str, value: Any) -> Any:
@@ -185,7 +227,7 @@ class PositionSensor:
         if motion.dims < len(self.names):
             raise UsageError(f"a sensor of {self.names} cannot see a motion in {motion.dims} dims")
         return tuple(
-            Component(name, lambda state, i=i: state[i], getattr(self, name))
+            Component(name, partial(_coordinate, i), getattr(self, name))
             for i, name in enumerate(self.names)
         )
 

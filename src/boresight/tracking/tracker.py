@@ -6,7 +6,7 @@ the first half of the recording, so that the second half can test it.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,8 @@ import numpy as np
 from boresight.errors import DataError, UsageError
 from boresight.filters.method import Filter
 from boresight.maths.frames import Site
+from boresight.models.atmosphere import Atmosphere
+from boresight.models.sensors import Radar
 from boresight.tracking import tables
 from boresight.tracking.choose import choose_noise, recursion_for, warmed_up
 from boresight.tracking.flight import Filtered, Flights, fly
@@ -37,6 +39,7 @@ def track(
     site: Site | None = None,
     sensor: str | None = None,
     noise: Noise | None = None,
+    atmosphere: Atmosphere | None = None,
     progress: Progress | None = None,
 ) -> TrackingResult:
     """Track every identified target of one radar.
@@ -48,6 +51,7 @@ def track(
             relative to a nominal place.
         sensor: which sensor ("SAC/SIC") if the table has several; left out: the busiest.
         noise: of the radar and its targets; left out: found from the plots.
+        atmosphere: the air whose delay is taken out of the ranges; needs altitudes.
         progress: called with how much is done, of how much.
 
     Raises:
@@ -65,8 +69,8 @@ def track(
             why="none has both a position and an identity (24-bit address or valid Mode A code)",
             next_step="boresight inspect FILE says what the file holds",
         )
-    case = _case(plots, found)
     place, how = site or NOWHERE, "given"
+    case = _case(plots, found, place, atmosphere)
     if noise is None:
         say(1, 4)
         noise, how = _find_noise(case, filter, place)
@@ -74,7 +78,7 @@ def track(
     recursion = recursion_for(filter, noise, place, case.flights.z.shape[1])
     result = fly(case.flights, recursion, place)
     say(3, 4)
-    settings = _settings(case, site, noise, how)
+    settings = _settings(case, site, noise, how) | {"atmosphere": _air(atmosphere)}
     return _result(case, result, filter.name, site, settings, remarks)
 
 
@@ -93,8 +97,11 @@ class _Case:
     half: float
 
 
-def _case(plots: "pl.DataFrame", found: Sorted) -> _Case:
+def _case(plots: "pl.DataFrame", found: Sorted, site: Site, atmosphere: Atmosphere | None) -> _Case:
     flights = _flights(plots, found)
+    if atmosphere is not None and flights.z.shape[1] == 3:
+        radar = Radar(range_m=1, azimuth_deg=1, pressure_altitude_m=1, site=site)
+        flights = replace(flights, z=replace(radar, atmosphere=atmosphere).without_air(flights.z))
     roll = tables.column(plots, "roll_deg", np.nan)[found.row]
     half = float(flights.time.min() + flights.time.max()) / 2
     return _Case(plots, found, flights, *straight_by_roll(flights, roll), half)
@@ -146,12 +153,15 @@ def _flights(plots: "pl.DataFrame", found: Sorted) -> Flights:
     return Flights(plots["time_s"].to_numpy()[found.row], np.stack(columns, axis=-1), found.track)
 
 
+def _air(atmosphere: Atmosphere | None) -> str:
+    return "none" if atmosphere is None else str(atmosphere)
+
+
 def _settings(case: _Case, site: Site | None, noise: Noise, how: str) -> dict[str, Any]:
     plots = case.plots
     return {
         "sensor": str(plots["sensor"][0]) if "sensor" in plots.columns else "",
         "site": asdict(site) if site else None,
-        "atmosphere": "none",
         "noise": asdict(noise),
         "noise_chosen": how,
         "association": "by identity: 24-bit address, else Mode A code with continuity",
