@@ -148,3 +148,4 @@ def test_angles_wrap_and_nothing_else_does(name):
     component = Component(name, None, 1.0)
     expected = -0.2 if name in ("azimuth_rad", "elevation_rad") else 2 * np.pi - 0.2
     assert component.residual(2 * np.pi + 0.1, 0.3) == pytest.approx(expected)
+    assert component.residual(2.0, -0.9) == pytest.approx(2.9)  # nearly half a turn is no turn

@@ -68,6 +68,8 @@ class Leaf:
     def pack(self, values: Array) -> Array:
         """(lanes, *shape) to (lanes, size)."""
         values = np.asarray(values, dtype=float)
+        if values.shape[values.ndim - len(self.shape) :] != self.shape:
+            raise UsageError(f"numbers of shape {values.shape} do not end in {self.shape}")
         if self.symmetric:
             return values[(..., *np.triu_indices(self.shape[0]))]
         return values.reshape(*values.shape[: values.ndim - len(self.shape)], self.size)

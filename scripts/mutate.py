@@ -1,0 +1,195 @@
+"""Plant faults, one at a time, in a copy of the source, and see whether the laws notice.
+
+    python scripts/mutate.py [--parallel 2] [--only TEXT]
+
+A law that no planted fault breaks is no law. Every fault is a change that a tired person could
+make: a sign, a factor, an index, a forgotten square. Each is planted alone in a copy of `src`, and
+the fast laws run against that copy in NumPy, stopping at the first failure. Survivors are printed;
+the exit code is 1 if fewer than nine in ten are caught.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LAWS = ("linalg", "motions", "components", "linear_world", "textbook", "starts", "symmetries")
+WANTED = 0.9
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One planted change: the first occurrence of `old` in `file` becomes `new`."""
+
+    file: str
+    old: str
+    new: str
+
+    def __str__(self) -> str:
+        """File and change in one line."""
+        return f"{self.file}: {' '.join(self.old.split())}  ->  {' '.join(self.new.split())}"
+
+
+def _faults(file: str, *changes: tuple[str, str]) -> Iterator[Fault]:
+    return (Fault(file, old, new) for old, new in changes)
+
+
+FAULTS = (
+    *_faults(
+        "models/components.py",
+        ("_FLOOR = 1e-6", "_FLOOR = 0.0"),
+        ("select(square < _FLOOR, _FLOOR, square)", "square"),
+        ("np.arctan2(y, x)", "np.arctan2(x, y)"),
+        ("np.arctan2(y, x)", "np.arctan2(y, abs(x))"),
+        ("select(on_axis, 1e-3, p[0])", "p[0]"),
+        ("_root(p[0] * p[0] + p[1] * p[1]))", "range_m(p, v))"),
+        ("zip(p, v, strict=True)) / range_m(p, v)", "zip(p, v, strict=True))"),
+        ("return wrap(difference) if self.is_angle else difference", "return difference"),
+        ("return wrap(difference) if self.is_angle else difference", "return wrap(difference)"),
+        ("measured - predicted", "predicted - measured"),
+    ),
+    *_faults(
+        "models/motion.py",
+        ("factor = factor * dt / (j - i)", "factor = factor * dt"),
+        ("[[q * dt**3 / 3, q * dt**2 / 2]", "[[q * dt**3 / 2, q * dt**2 / 2]"),
+        ("[[q * dt**4 / 4, q * 0.0]", "[[q * dt**4 / 4, q * dt**3 / 2]"),
+        ("[[q * dt**4 / 4, q * dt**3 / 2]", "[[q * dt**4 / 2, q * dt**3 / 2]"),
+        ("[q * dt**5 / 20, q * dt**4 / 8, q * dt**3 / 6]", "[q * dt**5 / 20] * 3"),
+        ("q * dt**3 / 6, q * dt**2 / 2, q * dt]", "q * dt**3 / 6, q * dt**2 / 2, q * dt**2]"),
+        ("half = w * dt / 2.0", "half = w * dt"),
+        ("1.0 - half * half / 6.0", "1.0 - half * half / 3.0"),
+        ("x + chord * (c * vx - s * vy)", "x + chord * (c * vx + s * vy)"),
+        ("cos = 2.0 * s * c, 1.0 - 2.0 * s * s", "cos = 2.0 * s * c, 1.0 - s * s"),
+        ("* (np.pi / 180.0) * dt", "* dt"),
+        ("x / r - y - x * z / ground,", "x / r + y - x * z / ground,"),
+        ("- 2 * x * z / ground,  # (14)", "+ 2 * x * z / ground,  # (14)"),
+        ("q = self.accel_mps2 * self.accel_mps2", "q = self.accel_mps2"),
+    ),
+    *_faults(
+        "filters/kalman.py",
+        ("F @ prior.cov @ F.T + motion.noise(dt)", "F @ prior.cov @ F.T"),
+        ("F @ prior.cov @ F.T", "F.T @ prior.cov @ F"),
+        ("S = mirror(H @ cov @ H.T + R)", "S = mirror(H @ cov @ H.T)"),
+        ("(1.0 - seen[i])", "0.0 * (1.0 - seen[i])"),
+        ("R[i, j] * seen[i] * seen[j]", "(i == j) * R[i, j] * seen[i] * seen[j]"),
+        ("[-2.0 * np.log(i)", "[2.0 * np.log(i)"),
+        ("mean + K @ nu", "mean - K @ nu"),
+        ("white * white", "white"),
+        ("value - h @ prior.mean", "value"),
+        ("component.sigma * component.sigma", "component.sigma"),
+    ),
+    *_faults(
+        "filters/ekf.py",
+        ("gain = cross * (there / s)", "gain = cross / s"),
+        ("mean + gain * nu", "mean + cross * nu"),
+        ("cov - np.outer(gain, cross)", "cov - np.outer(gain, gain)"),
+        ("s = h @ cross + r", "s = h @ cross"),
+        ("nu = nu - there * shift", "nu = nu + there * shift"),
+        ("gradient(component.value, at)", "gradient(component.value, prior.mean)"),
+        ("r = component.sigma * component.sigma + extra", "r = component.sigma * component.sigma"),
+        ("squares.append(nu * nu / s)", "squares.append(nu * nu / r)"),
+        ("rows.append(h * there)", "rows.append(h)"),
+        ("nu - H @ (prior.mean - post.mean)", "nu"),
+        ("kalman.condition(prior, moved", "kalman.condition(Gaussian(*post[:2]), moved"),
+        ("select(there < 0.5, 1.0, component.sigma", "select(there < 0.5, 0.0, component.sigma"),
+    ),
+    *_faults(
+        "filters/mekf.py",
+        ("mu + distance / 2 * weight * (nu", "mu + distance * weight * (nu"),
+        ("(nu * nu - s2)", "(nu * nu + s2)"),
+        ("distance * distance / 2 * weight * weight * s2", "distance / 2 * weight * weight * s2"),
+        ("weight * weight * s2 * s2", "weight * s2 * s2"),
+        ("shift + h @ (latest.mean - prior.mean)", "shift"),
+        ("at = prior.mean if", "at = latest.mean if"),
+        ("extra if added_variance else 0.0)", "extra)"),
+        ("there / (distance * distance * (h @ h))", "there"),
+        ("component.sigma * component.sigma))", "component.sigma))"),
+    ),
+    *_faults(
+        "filters/posterior.py",
+        ("seen < 0.5, predicted, measured", "seen < 0.5, 0.0 * predicted, measured"),
+        ("return nis, dof, -0.5 *", "return nis, dof, 0.5 *"),
+        ("LOG_TWO_PI * dof", "LOG_TWO_PI"),
+        ("np.log(2.0 * np.pi)", "np.log(np.pi)"),
+    ),
+    *_faults(
+        "filters/start.py",
+        ("spreads[1:] = [np.radians(s) for s in spreads[1:]]", "pass"),
+        ("J = np.stack([unit, r[:, None] * across", "J = np.stack([unit, across"),
+        ("position @ turn + origin", "position @ turn.T + origin"),
+        ("(spread + later) / t[..., None] ** 2", "(spread + later) / t[..., None]"),
+    ),
+    *_faults(
+        "maths/linalg.py",
+        ("np.maximum.outer(index, index)]", "np.minimum.outer(index, index)]"),
+        ("sum(L[j][k] * L[j][k] for k in range(j))", "sum(L[j][k] for k in range(j))"),
+        ("rest * inverse[j]", "rest"),
+        ("sum(L[k, i] * x[k] for k in range(i + 1", "sum(L[i, k] * x[k] for k in range(i + 1"),
+        ("+ K @ R @ K.T", "- K @ R @ K.T"),
+        ("factor * rows[k][j]", "factor"),
+    ),
+    *_faults(
+        "maths/angles.py",
+        ("TURN = 2 * np.pi", "TURN = np.pi"),
+        ("TURN * np.floor(0.5 - angle / TURN)", "0.0 * angle"),
+    ),
+)  # fmt: skip
+
+
+def caught(fault: Fault, tests: list[str]) -> bool:
+    """Whether the laws fail against a copy of the source with this fault."""
+    with tempfile.TemporaryDirectory(prefix="mutant-") as folder:
+        copy = Path(folder) / "src"
+        shutil.copytree(ROOT / "src", copy, ignore=shutil.ignore_patterns("__pycache__", "demo"))
+        path = copy / "boresight" / fault.file
+        text = path.read_text(encoding="utf-8")
+        if fault.old not in text:
+            raise SystemExit(f"the fault list is out of date: not found in {fault}")
+        path.write_text(text.replace(fault.old, fault.new, 1), encoding="utf-8")
+        return run_laws(copy, tests) == 1
+
+
+def run_laws(source: Path, tests: list[str]) -> int:
+    """Pytest's exit code for the laws against a source tree: 0 they hold, 1 one is broken."""
+    options = ["-n0", "-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider"]
+    environment = {"PYTHONPATH": str(source), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment |= {"BORESIGHT_TARGET": "numpy", "HYPOTHESIS_PROFILE": "mutants"}
+    done = subprocess.run(  # noqa: S603 - our own tests
+        [sys.executable, "-m", "pytest", *options, *tests],
+        cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if done.returncode not in (0, 1):
+        raise SystemExit(f"the laws did not run:\n{done.stdout}{done.stderr}")
+    return done.returncode
+
+
+def main() -> int:
+    """Plant every fault and report."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--parallel", type=int, default=2)
+    parser.add_argument("--only", default="", help="faults whose text contains this")
+    options = parser.parse_args()
+    tests = [str(ROOT / "tests" / "laws" / f"test_{name}.py") for name in LAWS]
+    if run_laws(ROOT / "src", tests) != 0:
+        raise SystemExit("the laws do not hold without any fault planted")
+    chosen = [fault for fault in FAULTS if options.only in str(fault)]
+    with ThreadPoolExecutor(options.parallel) as pool:
+        results = pool.map(lambda fault: caught(fault, tests), chosen)
+        survivors = []
+        for fault, found in zip(chosen, results, strict=True):
+            print("caught  " if found else "SURVIVED", fault, flush=True)
+            survivors += [] if found else [fault]
+    share = 1 - len(survivors) / len(chosen)
+    print(f"{len(chosen) - len(survivors)} of {len(chosen)} faults caught ({100 * share:.0f} %)")
+    return 0 if share >= WANTED else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
