@@ -1,5 +1,6 @@
 """The real command line, as a process: what it prints where, what it imports, how it ends."""
 
+import hashlib
 import json
 import os
 import signal
@@ -140,6 +141,7 @@ def test_a_mistake_with_json_is_one_object_too():
             ["track", DEMO, "--site=47.8,1.4,180"],
             "plots used tracks updates filter nis_per_dof rejected outputs",
         ),
+        (["reproduce", "aditya", "--runs", "20"], "claims figures seed"),
         (["cite", "mekf"], "key bibtex differs"),
     ],
 )
@@ -147,6 +149,18 @@ def test_json_is_alone_and_has_its_keys(arguments, keys):
     done = boresight(*arguments, "--json")
     assert done.returncode == 0, done.stderr
     assert set(keys.split()) <= set(only_object(done))
+
+
+def test_the_demo_needs_nothing_and_writes_where_it_stands(tmp_path):
+    done = boresight("demo", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = only_object(done)
+    assert {"plots", "used", "tracks", "updates", "nis_per_dof", "report"} <= set(found)
+    assert {each["filter"] for each in found["comparisons"]} == {"ekf", "mekf"}
+    page = (tmp_path / found["report"]).read_text(encoding="utf-8")
+    assert "Against the known truth" in page
+    assert "boresight demo --json" in page
+    assert hashlib.sha256(DEMO.read_bytes()).hexdigest() in page
 
 
 def test_options_of_every_command_stand_anywhere_but_behind_the_end_of_options():

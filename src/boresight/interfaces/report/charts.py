@@ -94,8 +94,8 @@ def library() -> bytes:
 
 
 def packed(content: bytes) -> str:
-    """Return `content` deflated, in base64; level 6 is within 1 % of 9 in half its time."""
-    return base64.b64encode(zlib.compress(content, 6)).decode()
+    """Return `content` deflated, in base64; level 4 is within 4 % of 9 in a third of its time."""
+    return base64.b64encode(zlib.compress(content, 4)).decode()
 
 
 def packed_json(content: Any) -> str:
