@@ -10,9 +10,9 @@ def main() -> int:
     try:
         page = pages.answer(sys.argv[1:])
         if page is None:
-            from boresight.interfaces import cli  # heavy: only when there is something to do
+            from boresight.interfaces.cli import run  # heavy: only when there is something to do
 
-            return cli.run(sys.argv[1:])
+            return run(sys.argv[1:])
         sys.stdout.write(page)
         sys.stdout.flush()
     except KeyboardInterrupt:
