@@ -109,7 +109,8 @@ FAULTS = (
         ("shift + h @ (latest.mean - prior.mean)", "shift"),
         ("at = prior.mean if", "at = latest.mean if"),
         ("extra if added_variance else 0.0)", "extra)"),
-        ("there / (distance * distance * (h @ h))", "there"),
+        ("distance * distance * (h @ h)", "h @ h"),
+        ("select(bend > 0.0, bend, np.inf)", "bend"),
         ("component.sigma * component.sigma))", "component.sigma))"),
     ),
     *_faults(

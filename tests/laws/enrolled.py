@@ -58,7 +58,7 @@ POINT = PositionSensor(x_m=20.0, y_m=35.0, z_m=50.0)
 FLAT = PositionSensor(x_m=20.0, y_m=35.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class World:
     """A motion, a sensor, and states that make sense in it."""
 
@@ -94,7 +94,7 @@ class World:
 _SPREAD = {"m": 200.0, "mps": 80.0, "mps2": 3.0, "radps": 0.02, "km": 1.0}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Entry:
     """One filter with settings; `curved` filters take angles and ranges."""
 

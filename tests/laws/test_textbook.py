@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from laws.enrolled import PLANAR, PLANE, POLAR, SPACE, Entry, World
+from laws.enrolled import CURVED, PLANAR, PLANE, POLAR, SPACE, Entry, World
 from oracles import filters as textbook
 
 seeds = st.integers(0, 2**32)
@@ -98,3 +98,17 @@ def test_in_the_plane_the_predicted_reading_is_the_block_form(seed):
     mean, cov, z, _ = drawn(world, seed)
     block = Entry("mekf-block").update(world, mean, cov, z)
     agree(Entry("mekf").update(world, mean, cov, z), block.mean, block.cov)
+
+
+@pytest.mark.parametrize("entry", CURVED, ids=str)
+@pytest.mark.parametrize(
+    "place", [(0, 0, 8e3), (0, 0, 0), (1e-4, 0, 5e3), (-2e4, -0.0, 1e3), (3e4, 1e3, 0)], ids=str
+)
+def test_no_place_is_singular(entry, place):
+    """Right overhead, at the sensor, on the seam, on the horizon: finite, positive, and nearer."""
+    world = World(SPACE, POLAR)
+    mean, cov = np.array([*place, 30.0, -20.0, 5.0], float), np.diag([1e4] * 3 + [400.0] * 3)
+    z = world.plot(mean + np.array([80, 60, 20, 0, 0, 0]), 1, sigmas=0.0)
+    post = entry.update(world, mean, cov, z)
+    assert np.isfinite([*post.mean, post.nis, post.loglik]).all()
+    assert np.linalg.eigvalsh(post.cov)[0] > 0

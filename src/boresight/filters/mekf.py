@@ -28,7 +28,7 @@ from boresight.filters.ekf import (
     update_sequential,
 )
 from boresight.filters.posterior import Posterior, innovation
-from boresight.maths import Gaussian, gradient
+from boresight.maths import Gaussian, gradient, select
 from boresight.models.components import Component
 
 Array = Any
@@ -50,7 +50,8 @@ def _angles(
         if component.is_angle:
             predicted, h = gradient(component.value, mean)
             there, nu = innovation(component, measured, predicted)
-            weight = there / (distance * distance * (h @ h))
+            bend = distance * distance * (h @ h)
+            weight = there / select(bend > 0.0, bend, np.inf)  # right overhead azimuth has no slope
             found.append((weight, h, nu, component.sigma * component.sigma))
     return found
 
