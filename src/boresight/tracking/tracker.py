@@ -66,7 +66,7 @@ def track(
     if not len(found.row):
         raise DataError(
             "no plot can be tracked",
-            why="none has both a position and an identity (24-bit address or valid Mode A code)",
+            why=_why_none(plots),
             next_step="boresight inspect FILE says what the file holds",
         )
     place, how = site or NOWHERE, "given"
@@ -105,6 +105,15 @@ def _case(plots: "pl.DataFrame", found: Sorted, site: Site, atmosphere: Atmosphe
     roll = tables.column(plots, "roll_deg", np.nan)[found.row]
     half = float(flights.time.min() + flights.time.max()) / 2
     return _Case(plots, found, flights, *straight_by_roll(flights, roll), half)
+
+
+def _why_none(plots: "pl.DataFrame") -> str:
+    if np.isfinite(tables.column(plots, "x_m", np.nan)).any():
+        return (
+            "positions are x and y (multilateration or surface movement); tracking by identity "
+            "takes range and azimuth of a radar"
+        )
+    return "none has both a position and an identity (24-bit address or valid Mode A code)"
 
 
 def _find_noise(case: _Case, chosen: Filter, place: Site) -> tuple[Noise, str]:
