@@ -56,8 +56,12 @@ FAULTS = (
         ("measured - predicted", "predicted - measured"),
     ),
     *_faults(
-        "models/motion.py",
+        "models/kinematics.py",
         ("factor = factor * dt / (j - i)", "factor = factor * dt"),
+        ("total + orders[j] * factor", "total + orders[j]"),
+    ),
+    *_faults(
+        "models/motion.py",
         ("[[q * dt**3 / 3, q * dt**2 / 2]", "[[q * dt**3 / 2, q * dt**2 / 2]"),
         ("[[q * dt**4 / 4, q * 0.0]", "[[q * dt**4 / 4, q * dt**3 / 2]"),
         ("[[q * dt**4 / 4, q * dt**3 / 2]", "[[q * dt**4 / 2, q * dt**3 / 2]"),

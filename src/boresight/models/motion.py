@@ -5,13 +5,13 @@ motion says otherwise. `move(state, dt)` takes and gives (n,); `noise(dt)` is th
 of what `move` leaves out. Both run on floats and on symbols.
 """
 
-from dataclasses import dataclass, fields
-from typing import Any, Literal, Protocol, get_args, get_origin
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from boresight.errors import UsageError
 from boresight.maths import select
+from boresight.models.kinematics import check_motion, each_axis, state_names, taylor
 
 Array = Any
 OFFSET = "height_offset_m"  # pressure altitude minus height above the ellipsoid
@@ -35,46 +35,6 @@ class Motion(Protocol):
         """Covariance (n, n) of the motion's uncertainty over dt seconds."""
 
 
-def _names(dims: int, *kinds: str) -> tuple[str, ...]:
-    return tuple(f"{kind.format(axis)}" for kind in kinds for axis in "xyz"[:dims])
-
-
-def _check(motion: Any) -> None:
-    """Standard deviations become floats or arrays and are checked, and so are the switches."""
-    for field in fields(motion):
-        value = getattr(motion, field.name)
-        if field.type is float:
-            number = np.asarray(value, dtype=float)
-            if not np.all(number >= 0):
-                raise UsageError(f"{field.name}={value!r} is not a standard deviation")
-            object.__setattr__(motion, field.name, number if number.ndim else float(number))
-        elif get_origin(field.type) is Literal and value not in get_args(field.type):
-            raise UsageError(
-                f"{field.name}={value!r} is unknown",
-                next_step=f"use one of {', '.join(get_args(field.type))}",
-            )
-    if motion.dims not in (2, 3):
-        raise UsageError(f"dims={motion.dims!r} is neither 2 nor 3")
-
-
-def _outer(block: list[list[Any]], dims: int) -> Array:
-    """The same small matrix for every axis: kron(block, I)."""
-    return np.kron(np.array(block), np.eye(dims))
-
-
-def _polynomial(state: Array, dt: Any, dims: int) -> Array:
-    """Taylor series of position and its derivatives over dt."""
-    orders = state.reshape(-1, dims)
-    moved = []
-    for i in range(len(orders)):
-        total, factor = orders[i], 1.0
-        for j in range(i + 1, len(orders)):
-            factor = factor * dt / (j - i)
-            total = total + orders[j] * factor
-        moved.append(total)
-    return np.concatenate(moved)
-
-
 @dataclass(frozen=True, kw_only=True)
 class ConstantVelocity:
     """Straight flight disturbed by white acceleration; state [positions, velocities].
@@ -93,16 +53,16 @@ class ConstantVelocity:
     discretisation: Literal["discrete", "continuous", "printed"] = "discrete"
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_motion(self)
 
     @property
     def names(self) -> tuple[str, ...]:
         """[x_m, y_m, (z_m,) vx_mps, ...]."""
-        return _names(self.dims, "{}_m", "v{}_mps")
+        return state_names(self.dims, "{}_m", "v{}_mps")
 
     def move(self, state: Array, dt: Any) -> Array:
         """Positions advance by velocity times dt."""
-        return _polynomial(state, dt, self.dims)
+        return taylor(state, dt, self.dims)
 
     def noise(self, dt: Any) -> Array:
         """Covariance (2 dims, 2 dims)."""
@@ -113,7 +73,7 @@ class ConstantVelocity:
             block = [[q * dt**4 / 4, q * 0.0], [q * 0.0, q * dt**2]]
         else:
             block = [[q * dt**4 / 4, q * dt**3 / 2], [q * dt**3 / 2, q * dt**2]]
-        return _outer(block, self.dims)
+        return each_axis(block, self.dims)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,16 +92,16 @@ class ConstantAcceleration:
     discretisation: Literal["discrete", "continuous"] = "continuous"
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_motion(self)
 
     @property
     def names(self) -> tuple[str, ...]:
         """[x_m, ..., vx_mps, ..., ax_mps2, ...]."""
-        return _names(self.dims, "{}_m", "v{}_mps", "a{}_mps2")
+        return state_names(self.dims, "{}_m", "v{}_mps", "a{}_mps2")
 
     def move(self, state: Array, dt: Any) -> Array:
         """Taylor series to the acceleration."""
-        return _polynomial(state, dt, self.dims)
+        return taylor(state, dt, self.dims)
 
     def noise(self, dt: Any) -> Array:
         """Covariance (3 dims, 3 dims)."""
@@ -155,7 +115,7 @@ class ConstantAcceleration:
                 [q * dt**4 / 8, q * dt**3 / 3, q * dt**2 / 2],
                 [q * dt**3 / 6, q * dt**2 / 2, q * dt],
             ]
-        return _outer(block, self.dims)
+        return each_axis(block, self.dims)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,7 +131,7 @@ class CoordinatedTurn:
     turn_accel_degps2: float
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_motion(self)
 
     @property
     def dims(self) -> int:
@@ -236,12 +196,12 @@ class Static:
     dims: int = 3
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_motion(self)
 
     @property
     def names(self) -> tuple[str, ...]:
         """[x_m, y_m, (z_m)]."""
-        return _names(self.dims, "{}_m")
+        return state_names(self.dims, "{}_m")
 
     def move(self, state: Array, dt: Any) -> Array:
         """Nothing moves."""
@@ -251,7 +211,7 @@ class Static:
     def noise(self, dt: Any) -> Array:
         """Covariance (dims, dims)."""
         q = self.drift_m_per_sqrt_s * self.drift_m_per_sqrt_s
-        return _outer([[q * dt]], self.dims)
+        return each_axis([[q * dt]], self.dims)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,7 +227,7 @@ class WithHeightOffset:
     drift_m_per_sqrt_s: float
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_motion(self)
 
     @property
     def dims(self) -> int:
@@ -309,7 +269,7 @@ class SphericalUnitRate:
     velocity_noise: float
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_motion(self)
 
     @property
     def dims(self) -> int:
