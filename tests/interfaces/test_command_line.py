@@ -216,8 +216,21 @@ def test_track_writes_tables_and_report(tmp_path):
     assert len(shapes["features"]) == found["tracks"]
 
 
+def plots_alone(recording):
+    """The CAT048 blocks of a raw recording: without CAT034 nobody says where the radar stands."""
+    kept, at = b"", 0
+    while at < len(recording):
+        length = int.from_bytes(recording[at + 1 : at + 3], "big")
+        kept += recording[at : at + length] if recording[at] == 48 else b""
+        at += length
+    return kept
+
+
 def test_without_a_site_no_geojson_is_written(tmp_path):
-    found = only_object(boresight("track", DEMO, "-o", tmp_path, "--json"))
+    nowhere = tmp_path / "plots.ast"
+    nowhere.write_bytes(plots_alone(DEMO.read_bytes()))
+    found = only_object(boresight("track", nowhere, "-o", tmp_path, "--json"))
+    assert any("--site" in remark for remark in found["remarks"])
     assert not any(path.endswith(".geojson") for path in found["outputs"])
 
 

@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -34,8 +34,13 @@ Site = Annotated[
     str | None,
     Parameter(
         allow_leading_hyphen=True,
-        help="Place of the sensor as LAT,LON,H: degrees, degrees, metres above the ellipsoid.",
+        help="Place of the sensor as LAT,LON,H: degrees, degrees, metres above the ellipsoid. "
+        "Left out: what the radar says of itself (CAT034), if it does.",
     ),
+]
+Air = Annotated[
+    Literal["none", "effective-earth", "exponential"],
+    Parameter(help="The air whose delay is taken out of the ranges."),
 ]
 Output = Annotated[Path, Parameter(alias="-o", help="Folder for report.html and the tables.")]
 Figures = Annotated[Path | None, Parameter(alias="-o", help="Folder for the paper's figures.")]
@@ -67,6 +72,7 @@ def track(
     filter: Annotated[  # noqa: A002 - the option is --filter
         str, Parameter(help="Which filter: see boresight cite.")
     ] = jobs.FILTER,
+    atmosphere: Air = "none",
     strict: Strict = False,
     columns: Columns = None,
     output: Output | None = None,
@@ -78,6 +84,7 @@ def track(
         site=door.site(site) if site is not None else None,
         sensor=sensor,
         name=filter,
+        atmosphere=door.atmosphere(atmosphere),
         strict=strict,
         columns=_columns(columns),
         folder=output,

@@ -8,6 +8,7 @@ from boresight.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
     from boresight.maths.frames import Site
+    from boresight.models.atmosphere import Atmosphere
 
 
 def site(text: str) -> "Site":
@@ -27,6 +28,15 @@ def site(text: str) -> "Site":
             "positive: --site 41.3007,2.1021,27.3",
         ) from None
     return Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
+
+
+def atmosphere(name: str) -> "Atmosphere | None":
+    """The air of that name, None for none."""
+    from boresight.models.atmosphere import EffectiveEarth, ExponentialAtmosphere
+
+    if name == "effective-earth":
+        return EffectiveEarth()
+    return ExponentialAtmosphere() if name == "exponential" else None
 
 
 def sensor(text: str, known: Sequence[str]) -> str:

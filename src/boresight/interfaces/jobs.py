@@ -13,8 +13,10 @@ from boresight.interfaces.answers import Answer
 from boresight.interfaces.terminal import Manner, progress
 
 if TYPE_CHECKING:
+    from boresight.formats.recording import Recording
     from boresight.interfaces.report import Report
     from boresight.maths.frames import Site
+    from boresight.models.atmosphere import Atmosphere
     from boresight.tracking.result import TrackingResult
 
 FILTER = "mekf"
@@ -46,6 +48,7 @@ def track(
     site: "Site | None",
     sensor: str | None,
     name: str,
+    atmosphere: "Atmosphere | None",
     strict: bool,
     columns: Mapping[str, str] | None,
     folder: Path | None,
@@ -64,7 +67,12 @@ def track(
     source = door.sensor(sensor, sensors(read.summary)) if sensor else None
     with progress(f"Tracking with {name}", manner) as watch:
         result = track_plots(
-            read.plots, site=site, sensor=source, filter=chosen, progress=watch.count
+            read.plots,
+            site=site or own_site(read, source),
+            sensor=source,
+            filter=chosen,
+            atmosphere=atmosphere,
+            progress=watch.count,
         )
     outputs = []
     if target:
@@ -87,6 +95,20 @@ def no_plots(file: Path, summary: Mapping[str, Any]) -> DataError:
         why=f"it holds {', '.join(held) or 'no records'}; plots are CAT048 or CAT010",
         next_step=f"boresight inspect {shlex.quote(str(file))}",
     )
+
+
+def own_site(read: "Recording", sensor: str | None) -> "Site | None":
+    """Where the tracked radar says it stands (CAT034, I034/120), if it does."""
+    import polars as pl
+
+    from boresight.maths.frames import Site
+
+    if read.sectors.is_empty():
+        return None
+    name = sensor or read.plots["sensor"].value_counts(sort=True)["sensor"][0]
+    mine = read.sectors.filter(pl.col("sensor") == name)
+    places = mine.select("latitude_deg", "longitude_deg", "height_m").drop_nulls()
+    return Site(**places.row(-1, named=True)) if places.height else None
 
 
 def sensors(summary: Mapping[str, Any]) -> list[str]:
