@@ -4,7 +4,8 @@
 "Improved Kalman Filter Design for Three-Dimensional Radar Tracking", 2001.
 Differs from them, by errata K1 to K4, K10, K11 and A4: gradients are derivatives (K1 was a slip);
 the range innovation is r - r_bar - mu (K2); azimuth terms carry cos(elevation) (K3); mu is only
-right at the point it was derived for, so the sequential form offers four readings (K4):
+right at the point it was derived for (K4), so the sequential form offers four readings of it:
+printed, predicted, second order and none.
 
     printed       mu from the innovations, at the point the angles have already updated
     predicted     range, gradient and mu all at the predicted point
