@@ -10,6 +10,7 @@ from boresight.errors import UsageError
 from boresight.formats import specs
 from boresight.formats.asterix import decode
 from boresight.formats.encode import encode_block, encode_blocks, encode_records
+from boresight.formats.plausible import plausibility
 
 RECORDS = 60
 
@@ -120,6 +121,20 @@ def test_an_item_past_the_end_of_its_block_makes_the_block_bad():
     assert ours.is_good.tolist() == [True, False, True]
     assert ours.block.tolist() == [0, 2]
     assert ours.raw("220").tolist() == [0xABCDEF] * 2
+
+
+def test_an_fspec_bit_of_no_item_makes_the_block_bad():
+    good = encode_records(21, "0.23", {"010/SAC": 1, "010/SIC": 2})[0]
+    assert good == bytes([0x80, 1, 2])
+    spare = bytes([0x81, 1, 1, 0x02, 1, 2])  # FRN 28 is spare in this edition
+    ours = read(21, "0.23", [good, spare, good], per_block=1)
+    assert ours.is_good.tolist() == [True, False, True]
+
+
+def test_blocks_that_do_not_fit_count_against_an_edition():
+    record = encode_records(48, "1.32", {"010/SAC": 1, "140": 5.0, "220": 7})[0]
+    ours = read(48, "1.32", [record, record, record[:-1], record[:-1]], per_block=1)
+    assert plausibility(ours) == 0.5
 
 
 def test_quantities_and_text_are_encoded_in_the_units_of_the_specification():

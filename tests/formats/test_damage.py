@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from boresight.errors import BoresightError, DataError, MissingInputError
+from boresight.formats.encode import encode_block, encode_records
 from boresight.formats.recording import inspect, read_recording
 from boresight.formats.stream import Account, stream
 
@@ -99,6 +100,14 @@ def test_a_length_that_swallows_other_blocks_hides_none_of_them(tmp_path):
     assert set(STARTS.tolist()) - {at} == found
     assert account.skipped == len(BLOCKS[100])
     assert account.damaged[0]["offset"] == at
+
+
+def test_a_record_that_names_no_source_is_damage_where_others_do(tmp_path):
+    nameless = encode_block(48, encode_records(48, "1.32", {"220": [5, 6]}))
+    at = int(STARTS[50])
+    found, account = places_of(CLEAN[:at] + nameless + CLEAN[at:], tmp_path)
+    assert len(found) == len(BLOCKS)
+    assert (account.skipped, account.damaged[0]["offset"]) == (len(nameless), at)
 
 
 def test_strict_stops_at_the_first_damage_and_says_where(tmp_path):

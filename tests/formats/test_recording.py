@@ -216,7 +216,8 @@ def oracle_agrees(file, category, name, records):
     assert len(ours) >= len(picked)
     for path, cells in expected.items():
         found = ours.cells(path)
-        if found is None:
+        if path in ("SP", "RE"):
+            assert found is None
             continue
         raw = found.raw.astype(np.uint64) & np.uint64(2**found.field.width - 1)
         assert list(zip(found.record.tolist(), raw.tolist(), strict=True)) == cells, path
@@ -247,6 +248,20 @@ def test_a_sample_of_the_barcelona_hour_equals_libasterix():
 @pytest.mark.slow
 def test_all_of_the_barcelona_hour_equals_libasterix():
     assert oracle_agrees(BARCELONA, 48, "1.32", 44_085) > 50
+
+
+@needs_data
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "category", "edition", "records"),
+    [
+        ("adsb.ast", 21, "0.23", 24_581),
+        ("smr.ast", 10, "1.1", 38_117),
+        ("mlat.ast", 10, "1.1", 38_548),
+    ],
+)
+def test_all_of_the_surface_recordings_equal_libasterix(name, category, edition, records):
+    assert oracle_agrees(DATA / "barcelona-surface" / name, category, edition, records) > 10
 
 
 @needs_data
@@ -300,7 +315,8 @@ def test_adsb_of_edition_023_is_named_and_no_position_is_wrong():
     same = (table["address"][1:] == table["address"][:-1]).to_numpy() & (step < 30)
     north = np.diff(table["latitude_deg"]) * 111_000
     east = np.diff(table["longitude_deg"]) * 83_000
-    assert (np.hypot(north, east)[same] <= 350 * step[same] + 150).all()
+    # Reports are stamped up to seconds late; a misread position is off by tens of kilometres.
+    assert (np.hypot(north, east)[same] <= 350 * step[same] + 2_000).all()
     assert oracle_agrees(ADSB, 21, "0.23", 400) > 10
 
 
@@ -312,10 +328,12 @@ def test_the_system_tracks_of_a_centre_are_read():
     assert found.summary["categories"][0]["sensor"] == "226/2"
 
 
-def test_a_block_of_several_records_and_an_empty_wish_list(tmp_path):
+def test_of_editions_that_read_alike_the_newest_is_named_and_the_others_told(tmp_path):
     columns = making.radar_columns(50)
     file = tmp_path / "a.ast"
     file.write_bytes(encode_block(48, encode_records(48, "1.30", columns)))
     found = inspect(file)
     assert found["categories"][0]["records"] == 50
     assert found["addresses"] == 20
+    assert found["categories"][0]["edition"] == "1.32"
+    assert "1.27, 1.28, 1.29, 1.30, 1.31, 1.32 read alike" in found["notes"][0]

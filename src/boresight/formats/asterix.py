@@ -36,7 +36,7 @@ class Records:
         buffer: the octets they lie in.
         block: (n,) index of each record's block among those given.
         start: (n,) offset of each record in the buffer.
-        offsets: (n, slots) offset of each item in the buffer, -1 where absent.
+        offsets: (slots, n) offset of each item in the buffer, -1 where absent.
         is_good: (blocks,) whether the block was read; records of other blocks are not here.
     """
 
@@ -57,7 +57,7 @@ class Records:
             self.buffer,
             self.block[rows],
             self.start[rows],
-            self.offsets[rows],
+            self.offsets[:, rows],
             self.is_good,
         )
 
@@ -128,7 +128,7 @@ class Records:
         return values
 
     @cached_property
-    def _layouts(self) -> dict[str, tuple[Integers, Integers]]:
+    def _layouts(self) -> dict[str, NDArray[np.int32]]:
         return {}
 
     def _locate(self, path: str) -> tuple[Integers, Integers, Shape, str] | None:
@@ -140,26 +140,25 @@ class Records:
         slot = self.edition.record.slots[frn]
         assert slot is not None  # noqa: S101  (frn finds no spare slot)
         shape = slot.shape
-        rows = np.flatnonzero(self.offsets[:, frn] >= 0)
-        at = self.offsets[rows, frn].astype(np.int64)
+        rows = np.flatnonzero(self.offsets[frn] >= 0)
+        at = self.offsets[frn, rows].astype(np.int64)
         while shape.kind == "compound" and rest:
             names = [sub.name if sub else "" for sub in shape.slots]
             if rest[0] not in names:
                 return None
             index = names.index(rest.pop(0))
-            offsets = self._inside(item, at, shape)[:, index]
+            offsets = self._inside(item, at, shape)[index].astype(np.int64)
             rows, at = rows[offsets >= 0], offsets[offsets >= 0]
             sub = shape.slots[index]
             assert sub is not None  # noqa: S101  (a name was found)
             shape, item = sub.shape, f"{item}/{sub.name}"
         return rows, at, shape, "/".join(rest)
 
-    def _inside(self, item: str, at: Integers, shape: Shape) -> Integers:
+    def _inside(self, item: str, at: Integers, shape: Shape) -> NDArray[np.int32]:
         """Lay a compound item out once, however many of its fields are asked for."""
         if item not in self._layouts:
-            layout = lay_out(self.buffer, at, shape)
-            self._layouts[item] = (layout.offsets, layout.end)
-        return self._layouts[item][0]
+            self._layouts[item] = lay_out(self.buffer, at, shape).offsets
+        return self._layouts[item]
 
 
 def decode(buffer: Octets, starts: Integers, ends: Integers, edition: Edition) -> Records:

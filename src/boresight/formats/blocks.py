@@ -36,15 +36,22 @@ class Found(NamedTuple):
 
 def follow(data: bytes, at: int, end: int) -> Found:
     """Follow headers from `at` until `end` or the first one that cannot be a header."""
-    starts, ends = [], []
-    while at + HEADER < end and data[at] in ASSIGNED:
-        after = at + (data[at + 1] << 8 | data[at + 2])
-        if after <= at + HEADER or after > end:
+    starts: list[int] = []
+    keep = starts.append
+    last = end - HEADER
+    category = -1
+    while at < last:
+        # Neighbours are mostly of one category, and comparing is quicker than looking up.
+        if data[at] != category:
+            if data[at] not in ASSIGNED:
+                break
+            category = data[at]
+        length = data[at + 1] << 8 | data[at + 2]
+        if length <= HEADER or at + length > end:
             break
-        starts.append(at)
-        ends.append(after)
-        at = after
-    return Found(starts, ends, [], at)
+        keep(at)
+        at += length
+    return Found(starts, [*starts[1:], at] if starts else [], [], at)
 
 
 def split(data: bytes, at: int, end: int, *, more: bool) -> Found:

@@ -104,8 +104,8 @@ def _spares_are_zero(records: Records) -> float:
     is_zero = np.ones(len(records), bool)
     for frn, slot in enumerate(records.edition.record.slots):
         if slot is not None and slot.shape.kind in ("fixed", "extended"):
-            rows = np.flatnonzero(records.offsets[:, frn] >= 0)
-            at = records.offsets[rows, frn].astype(np.int64)
+            rows = np.flatnonzero(records.offsets[frn] >= 0)
+            at = records.offsets[frn, rows].astype(np.int64)
             is_zero[rows] &= ~_any_spare(records.buffer, at, slot.shape)
     return float(is_zero.mean())
 

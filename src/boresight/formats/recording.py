@@ -93,10 +93,8 @@ def _jump_notes(table: "pl.DataFrame") -> list[str]:
     jumps = int(table["position_jumps"].sum())
     if not jumps:
         return []
-    return [
-        f"{jumps} of {table.height} ADS-B reports place their aircraft where it cannot be: kept "
-        + "as recorded, marked position_jumps."
-    ]
+    told = f"{jumps} of {table.height} ADS-B reports place their aircraft where it cannot be"
+    return [f"{told}: kept as recorded, marked position_jumps."]
 
 
 def inspect(

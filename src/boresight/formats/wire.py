@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from boresight.formats.specs import Edition, Shape, Slot
+from boresight.formats.specs import Edition, Shape
 
 Octets = NDArray[np.uint8]
 Integers = NDArray[np.int64]
@@ -23,7 +23,7 @@ Flags = NDArray[np.bool_]
 class Layout(NamedTuple):
     """Where the slots of n compound items lie in the buffer."""
 
-    offsets: Integers  # (n, slots), -1 where absent
+    offsets: NDArray[np.int32]  # (slots, n), -1 where absent
     end: Integers  # (n,)
     is_good: Flags  # (n,)
 
@@ -35,7 +35,7 @@ class Walk:
     Attributes:
         block: (n,) index of each record's block, ascending.
         start: (n,) offset of each record in the buffer.
-        offsets: (n, slots) offset of each item in the buffer, -1 where absent.
+        offsets: (slots, n) offset of each item in the buffer, -1 where absent.
         is_good: (blocks,) the block is a whole number of valid records and nothing else.
     """
 
@@ -49,7 +49,7 @@ def walk(buffer: Octets, starts: Integers, ends: Integers, edition: Edition) -> 
     """Walk through the records of blocks.
 
     Args:
-        buffer: the octets; may hold anything besides the blocks.
+        buffer: the octets, less than 2 GiB; may hold anything besides the blocks.
         starts: (blocks,) offset of each block's category octet.
         ends: (blocks,) offset after each block's last octet, at most `len(buffer)`.
         edition: the layout to read them by.
@@ -62,7 +62,7 @@ def walk(buffer: Octets, starts: Integers, ends: Integers, edition: Edition) -> 
         layout = lay_out(buffer, at, edition.record)
         fits = layout.is_good & (layout.end <= ends[lanes])
         is_good[lanes[~fits]] = False
-        rounds.append((lanes, at, layout.offsets.astype(np.int32)))
+        rounds.append((lanes, at, layout.offsets))
         goes_on = fits & (layout.end < ends[lanes])
         lanes, at = lanes[goes_on], layout.end[goes_on]
     return _in_order(rounds, is_good, len(edition.record.slots))
@@ -72,81 +72,59 @@ def _in_order(rounds: list[Any], is_good: Flags, slots: int) -> Walk:
     """Join the rounds, by block and then by place in the block, without those of bad blocks."""
     if not rounds:
         empty = np.empty(0, np.int64)
-        return Walk(empty, empty, np.empty((0, slots), np.int32), is_good)
-    block, start, offsets = (np.concatenate(parts) for parts in zip(*rounds, strict=True))
+        return Walk(empty, empty, np.empty((slots, 0), np.int32), is_good)
+    if len(rounds) == 1 and is_good[rounds[0][0]].all():
+        block, start, offsets = rounds[0]
+        return Walk(block, start, offsets, is_good)
+    block, start, offsets = (np.concatenate(p, axis=-1) for p in zip(*rounds, strict=True))
     order = np.argsort(block, kind="stable")
     order = order[is_good[block[order]]]
-    return Walk(block[order], start[order], offsets[order], is_good)
+    return Walk(block[order], start[order], offsets[:, order], is_good)
 
 
 def lay_out(buffer: Octets, at: Integers, shape: Shape) -> Layout:
     """Find the slots of compound items (or records) that start at `at` (n,)."""
-    present, at, is_good = _read_fspec(buffer, at, shape)
-    offsets = np.full(present.shape, -1, np.int64)
-    for first, last, sizes in _plan(shape):
-        if sizes is not None:
-            here = present[:, first:last]
-            after = at[:, None] + np.cumsum(here * sizes, axis=1)
-            offsets[:, first:last] = np.where(here, after - sizes, -1)
-            at = after[:, -1]
+    fspec, at, is_good = _read_fspec(buffer, at, shape)
+    offsets = np.full((len(shape.slots), len(at)), -1, np.int32)
+    for index, slot in enumerate(shape.slots):
+        present = (fspec[index // 7] & (128 >> index % 7)).astype(bool)
+        if slot is None or not present.any():
             continue
-        lanes = np.flatnonzero(present[:, first])
-        if lanes.size:
-            slot = shape.slots[first]
-            assert slot is not None  # noqa: S101  (a lane with a spare bit set is bad, not present)
-            offsets[lanes, first] = at[lanes]
-            size, is_valid = _MEASURE[slot.shape.kind](buffer, at[lanes], slot.shape)
-            at[lanes] += size
-            is_good[lanes] &= is_valid
+        np.copyto(offsets[index], at, where=present, casting="same_kind")
+        if slot.shape.kind == "fixed":
+            np.add(at, slot.shape.size, out=at, where=present)
+            continue
+        lanes = np.flatnonzero(present)
+        size, is_valid = _MEASURE[slot.shape.kind](buffer, at[lanes], slot.shape)
+        at[lanes] += size
+        is_good[lanes] &= is_valid
     return Layout(offsets, at, is_good)
 
 
 @cache
-def _plan(shape: Shape) -> tuple[tuple[int, int, Any], ...]:
-    """Split slots into runs of fixed items, which one sum places, and single other items."""
-    steps: list[tuple[int, int, Any]] = []
-    for index, slot in enumerate(shape.slots):
-        size = _fixed_size(slot)
-        if size is None:
-            steps.append((index, index + 1, None))
-        elif steps and steps[-1][2] is not None:
-            first, _, sizes = steps[-1]
-            steps[-1] = (first, index + 1, np.append(sizes, size))
-        else:
-            steps.append((index, index + 1, np.array([size])))
-    return tuple(steps)
+def _undefined(shape: Shape) -> tuple[int, ...]:
+    """Return, octet by octet, the FSPEC bits that no item owns; one that is set is an error."""
+    masks = [0] * shape.fspec
+    for index in range(7 * shape.fspec):
+        if index >= len(shape.slots) or shape.slots[index] is None:
+            masks[index // 7] |= 128 >> index % 7
+    return tuple(masks)
 
 
-def _fixed_size(slot: Slot | None) -> int | None:
-    if slot is None:
-        return 0
-    return slot.shape.size if slot.shape.kind == "fixed" else None
-
-
-@cache
-def _undefined(shape: Shape) -> NDArray[np.intp]:
-    """Return the FSPEC bits that no item owns: one that is set makes the record bad."""
-    spare = [index for index, slot in enumerate(shape.slots) if slot is None]
-    return np.array([*spare, *range(len(shape.slots), 7 * shape.fspec)], np.intp)
-
-
-def _read_fspec(buffer: Octets, at: Integers, shape: Shape) -> tuple[Flags, Integers, Flags]:
-    """Return the presence of each slot (n, slots), the offset after the FSPEC and validity."""
-    octets = np.zeros((len(at), shape.fspec), np.uint8)
+def _read_fspec(buffer: Octets, at: Integers, shape: Shape) -> tuple[Octets, Integers, Flags]:
+    """Return FSPEC octets (octets, n), zero where there is none, the offset after and validity."""
+    fspec = np.zeros((shape.fspec, len(at)), np.uint8)
+    after = at.copy()
     more = np.ones(len(at), bool)
-    size = np.zeros(len(at), np.int64)
-    for index in range(shape.fspec):
-        octet = buffer.take(at + index, mode="clip")
-        octets[:, index] = octet * more
-        size += more
-        more = more & (octet & 1).astype(bool)
+    is_good = np.ones(len(at), bool)
+    for index, undefined in enumerate(_undefined(shape)):
+        np.copyto(fspec[index], buffer.take(after, mode="clip"), where=more)
+        after += more
+        is_good &= (fspec[index] & undefined) == 0
+        more = (fspec[index] & 1).astype(bool)
         if not more.any():
             break
-    bits = np.unpackbits(octets, axis=1).reshape(len(at), shape.fspec, 8)[:, :, :7]
-    present = bits.reshape(len(at), 7 * shape.fspec).astype(bool)
-    is_good = ~more & ~present[:, _undefined(shape)].any(axis=1)
-    present[:, _undefined(shape)] = False
-    return present[:, : len(shape.slots)], at + size, is_good
+    return fspec, after, is_good & ~more
 
 
 def part_count(buffer: Octets, at: Integers, shape: Shape) -> Integers:
