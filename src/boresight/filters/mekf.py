@@ -51,8 +51,10 @@ def _angles(
         if component.is_angle:
             predicted, h = gradient(component.value, mean)
             there, nu = innovation(component, measured, predicted)
-            bend = distance * distance * (h @ h)
-            weight = there / select(bend > 0.0, bend, np.inf)  # right overhead azimuth has no slope
+            weight = there
+            if component.name != "elevation_rad":  # whose gradient is 1 / r: the weight is 1
+                bend = distance * distance * (h @ h)
+                weight = there / select(bend > 0.0, bend, np.inf)  # overhead there is no slope
             found.append((weight, h, nu, component.sigma * component.sigma))
     return found
 
@@ -66,9 +68,9 @@ def _curvature(
     """
     mu, variance = 0.0, 0.0
     for weight, _, nu, s2 in _angles(z, components, mean, distance):
-        mu = mu + distance / 2 * weight * (nu * nu - s2)
-        variance = variance + distance * distance / 2 * weight * weight * s2 * s2
-    return mu, variance
+        mu = mu + weight * (nu * nu - s2)
+        variance = variance + weight * weight * (s2 * s2)
+    return distance * mu * 0.5, distance * distance * variance * 0.5
 
 
 def _second_order(
