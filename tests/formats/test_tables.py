@@ -1,7 +1,6 @@
 """Tables in and out: names, units, what is wrong and where, and that nothing is dropped unsaid."""
 
 import json
-import time
 
 import numpy as np
 import polars as pl
@@ -85,10 +84,8 @@ WRONG = {
 def test_wrong_tables_get_one_error_that_says_where(tmp_path, name, read):
     text, where, what = WRONG[name]
     file = csv(tmp_path, text)
-    begun = time.perf_counter()
     with pytest.raises(DataError) as caught:
         read(file)
-    assert time.perf_counter() - begun < 2
     assert caught.value.exit_code == 65
     assert where in caught.value.where
     assert what in str(caught.value)

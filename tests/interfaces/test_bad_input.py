@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 
 DEMO = Path(__file__).parents[2] / "src/boresight/demo/recording.ast"
 HEADER = "time_s,range_m,azimuth_deg,address\n"
-SECONDS = 2.0
 
 
 def ethernet(payload):
@@ -79,16 +77,14 @@ DAMAGED = {
 
 
 def boresight(*arguments):
-    """Run the command line; return what it did and how long it took."""
-    start = time.perf_counter()
-    done = subprocess.run(
+    """Run the command line; return what it did."""
+    return subprocess.run(
         [sys.executable, "-m", "boresight", *map(str, arguments)],
         capture_output=True,
         text=True,
         timeout=60,
         check=False,
     )
-    return done, time.perf_counter() - start
 
 
 def assert_refused(done, code, said):
@@ -106,42 +102,37 @@ def assert_refused(done, code, said):
 def test_what_is_no_recording_is_refused(tmp_path, case, command):
     name, octets, code, said = REFUSED[case]
     (tmp_path / name).write_bytes(octets)
-    done, seconds = boresight(command, tmp_path / name)
+    done = boresight(command, tmp_path / name)
     assert_refused(done, code, said)
-    assert seconds <= SECONDS
 
 
 @pytest.mark.parametrize("case", DAMAGED)
 def test_damage_is_skipped_counted_and_placed(tmp_path, case):
     octets, at = DAMAGED[case]
     (tmp_path / "a.ast").write_bytes(octets)
-    done, seconds = boresight("inspect", tmp_path / "a.ast")
+    done = boresight("inspect", tmp_path / "a.ast")
     assert done.returncode == 0, done.stderr
     assert "bytes skipped" in done.stdout
     assert f"damaged at byte {at:,}:" in done.stdout
-    assert seconds <= SECONDS
-    strict, seconds = boresight("inspect", "--strict", tmp_path / "a.ast")
+    strict = boresight("inspect", "--strict", tmp_path / "a.ast")
     assert_refused(strict, 65, f"byte offset {at}")
-    assert seconds <= SECONDS
 
 
 def test_trailing_bytes_of_a_recorder_are_left_out(tmp_path):
     whole, trailed = tmp_path / "whole.pcap", tmp_path / "trailed.pcap"
     whole.write_bytes(capture(blocks(200)))
     trailed.write_bytes(capture([block + b"\xa5\xa5\0\0\x12\x34" for block in blocks(200)]))
-    (left, _), (right, seconds) = (boresight("inspect", each) for each in (whole, trailed))
+    left, right = (boresight("inspect", each) for each in (whole, trailed))
     assert left.returncode == right.returncode == 0
     assert "CAT034" in left.stdout
     rows = [[line for line in each.stdout.splitlines() if "CAT" in line] for each in (left, right)]
     assert rows[0] == rows[1]
     assert "1200 octets that a recorder appended" in right.stderr
-    assert seconds <= SECONDS
 
 
 def test_a_folder_is_no_file(tmp_path):
-    done, seconds = boresight("track", tmp_path)
+    done = boresight("track", tmp_path)
     assert_refused(done, 66, "is a folder")
-    assert seconds <= SECONDS
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
@@ -156,9 +147,8 @@ def test_rows_without_a_range_are_skipped_and_counted(tmp_path):
     rows = [f"{10 + 4 * i},{5000 + 400 * i},45,A00001" for i in range(20)]
     rows[7] = "38,nan,45,A00001"
     (tmp_path / "a.csv").write_bytes(table(*rows))
-    done, seconds = boresight("inspect", tmp_path / "a.csv")
+    done = boresight("inspect", tmp_path / "a.csv")
     assert done.returncode == 0, done.stderr
     assert " 19 " in done.stdout
     assert "1 row" in done.stderr
-    assert seconds <= SECONDS
-    assert_refused(boresight("inspect", "--strict", tmp_path / "a.csv")[0], 65, "line 9")
+    assert_refused(boresight("inspect", "--strict", tmp_path / "a.csv"), 65, "line 9")

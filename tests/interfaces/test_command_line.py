@@ -59,15 +59,6 @@ def test_the_first_page_imports_nothing_heavy(arguments):
     assert not HEAVY & set(done.stderr.split())
 
 
-def test_help_takes_at_most_half_a_second():
-    walls = []
-    for _ in range(5):
-        start = time.perf_counter()
-        boresight("--help")
-        walls.append(time.perf_counter() - start)
-    assert min(walls) <= 0.5
-
-
 def test_the_static_page_tells_what_the_command_line_knows():
     known = {name: cli.app[name].help.strip() for name in cli.app if not name.startswith("-")}
     assert known == pages.COMMANDS
@@ -236,11 +227,9 @@ def test_without_a_site_no_geojson_is_written(tmp_path):
 
 def test_a_folder_that_cannot_be_made_is_told_before_any_work(tmp_path):
     (tmp_path / "file").touch()
-    start = time.perf_counter()
     done = boresight("track", DEMO, "-o", tmp_path / "file")
     assert done.returncode == 74
     assert "-o DIR" in done.stderr
-    assert time.perf_counter() - start < 2
 
 
 def test_a_recording_without_plots_says_what_it_holds(tmp_path):
@@ -305,10 +294,8 @@ def test_a_fault_of_ours_is_one_sentence_and_code_70(monkeypatch, capsys):
 
 
 @needs_barcelona
-def test_the_barcelona_hour_is_inspected_in_two_seconds():
-    start = time.perf_counter()
+def test_the_barcelona_hour_is_inspected():
     found = only_object(boresight("inspect", BARCELONA, "--json"))
-    assert time.perf_counter() - start <= 2
     (only,) = found["categories"]
     assert (only["category"], only["records"], only["sensor"]) == (48, 44_085, "20/129")
     assert found["addresses"] == 177
