@@ -28,7 +28,7 @@ from boresight.lanes import (
 )
 from boresight.lanes.elementary import lower
 from c_code import COMMON, FLAGS, FORMS, gcc_kernel
-from measure import interleaved, machine, publish
+from measure import at_most, interleaved, machine, publish
 from scenario import DT, RADAR, SPATIAL, Scenario, planar, straight
 
 Array = Any
@@ -65,7 +65,7 @@ def problems() -> dict[str, tuple[Program, dict[str, Any], Scenario]]:
 
 def rivals(kernel: Kernel) -> dict[str, Kernel]:
     """Gcc's kernels by form and flags; empty without gcc or on another processor."""
-    if shutil.which("g++") is None or kernel.code is None or kernel.code.shape.width != 8:
+    if shutil.which("g++") is None or kernel.code is None:
         return {}
     return {
         f"gcc {form} {name}": gcc_kernel(kernel, form, flags)
@@ -101,7 +101,7 @@ def verdict(times: Mapping[str, dict[str, float]], apart: Mapping[str, float]) -
     """Our time over that of gcc's fastest variant whose results agree with ours."""
     agreeing = [n for n in times if n.startswith("gcc") and apart[n] <= AGREEMENT]
     if not agreeing:
-        return {"skipped": "no gcc, or not eight lanes wide"}
+        return {"skipped": "no gcc"}
     best = min(agreeing, key=lambda name: times[name]["median"])
     strict = [n for n in agreeing if n.endswith("plain")]
     ratio = times["ours blocks"]["median"] / times[best]["median"]
@@ -111,8 +111,6 @@ def verdict(times: Mapping[str, dict[str, float]], apart: Mapping[str, float]) -
         "ratio_of_minima": times["ours blocks"]["min"] / times[best]["min"],
         "ratio_to_gcc_without_fast_math": times["ours blocks"]["median"]
         / min(times[n]["median"] for n in strict),
-        "limit": LIMIT,
-        "met": ratio <= LIMIT,
     }
 
 
@@ -177,6 +175,11 @@ def main() -> None:
             "steps": STEPS,
             "kernels": results,
             "layouts": layouts(),
+            "targets": {
+                f"{name}, our time over that of gcc's fastest": at_most(result["ratio"], LIMIT)
+                for name, result in results.items()
+                if "ratio" in result
+            },
         },
     )
 

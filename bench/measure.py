@@ -45,6 +45,16 @@ def summary(values: list[float]) -> dict[str, float]:
     return {"min": min(values), "median": statistics.median(values), "rounds": len(values)}
 
 
+def at_most(value: float, limit: float) -> dict[str, Any]:
+    """A target from above, for the table of run_all."""
+    return {"is": value, "at_most": limit, "met": bool(value <= limit)}
+
+
+def at_least(value: float, limit: float) -> dict[str, Any]:
+    """A target from below, for the table of run_all."""
+    return {"is": value, "at_least": limit, "met": bool(value >= limit)}
+
+
 def machine(*packages: str) -> dict[str, Any]:
     """Where and with what a figure was taken."""
     cpu = ""

@@ -5,7 +5,9 @@ of our `ekf` before it is timed. Ours is the sequential MEKF, which does somewha
 turn in one process; times are CPU time of predict and update together, one thread.
 
 Stone Soup, filterpy and nrl-tracker filter one track at a time: their time for 1,000 runs is that
-of one run. dynamax filters all runs at once (jit of vmap).
+of one run. dynamax filters all runs at once (jit of vmap), twice: as it comes, with the means and
+covariances of prediction and update, and with the updated means alone, which is all that ours
+writes here.
 """
 
 import os
@@ -20,7 +22,7 @@ os.environ.setdefault(
 import numpy as np
 
 import boresight as bs
-from measure import interleaved, machine, publish, version
+from measure import at_least, interleaved, machine, publish, version
 from scenario import DT, RADAR, SIGMA, SPATIAL, Scenario, straight
 
 Array = Any
@@ -31,7 +33,8 @@ Q = SPATIAL.noise(DT)
 R = np.diag(SIGMA**2)
 # Relative to the largest coordinate. Stone Soup takes numeric Jacobians, dynamax adds a jitter.
 TOLERANCE = {"stonesoup": 1e-5, "filterpy": 1e-10, "nrl-tracker": 1e-10, "dynamax": 1e-4}
-KERNEL = {"filterpy": 1_500, "stonesoup": 30_000, "dynamax": 50}  # how many times faster we must be
+# How many times faster we must be.
+KERNEL = {"filterpy": 1_500, "stonesoup": 30_000, "dynamax": 50, "dynamax, means only": 50}
 STREAM = {"filterpy": 10, "stonesoup": 250}
 
 
@@ -143,11 +146,11 @@ def dynamax(given: Scenario) -> Callable[[Array], Array]:
         emission_covariance=r,
     )
 
-    def one(z: Array) -> Array:
-        return extended_kalman_filter(model, z, output_fields=["filtered_means"]).filtered_means
-
-    batch = jax.jit(jax.vmap(one))
-    return lambda z: batch(z).block_until_ready()
+    whole = jax.jit(jax.vmap(lambda z: extended_kalman_filter(model, z)))
+    means = jax.jit(
+        jax.vmap(lambda z: extended_kalman_filter(model, z, output_fields=["filtered_means"]))
+    )
+    return lambda z: jax.block_until_ready(whole(z)), lambda z: jax.block_until_ready(means(z))
 
 
 def singles() -> Iterator[tuple[str, Peer, int]]:
@@ -198,9 +201,11 @@ def main() -> None:
         tasks[name] = lambda peer=peer, steps=steps: peer(given.z[0, :steps], given)
         per[name] = steps
     if version("dynamax"):
-        batch = dynamax(given)
-        apart["dynamax"] = distance("dynamax", np.asarray(batch(given.z)), ours)
-        tasks["dynamax"], per["dynamax"] = lambda: batch(given.z), RUNS * STEPS
+        whole, means = dynamax(given)
+        apart["dynamax"] = distance("dynamax", np.asarray(whole(given.z).filtered_means), ours)
+        tasks["dynamax"] = lambda: whole(given.z)
+        tasks["dynamax, means only"] = lambda: means(given.z)
+        per |= dict.fromkeys(("dynamax", "dynamax, means only"), RUNS * STEPS)
     times = interleaved(tasks, rounds=ROUNDS, per={n: p * 1e-9 for n, p in per.items()})
     publish(
         "peers",
@@ -211,8 +216,8 @@ def main() -> None:
             "steps": STEPS,
             "ns_per_step": times,
             "relative_difference_from_our_ekf": {"is": apart, "at_most": TOLERANCE},
-            "kernel_times_faster": ratios(times, "boresight.run mekf", KERNEL),
-            "stream_times_faster": ratios(times, "boresight.stream mekf, arrays", STREAM),
+            "targets": ratios(times, "boresight.run mekf", KERNEL)
+            | ratios(times, "boresight.stream mekf, arrays", STREAM),
         },
     )
 
@@ -220,11 +225,9 @@ def main() -> None:
 def ratios(times: dict[str, Any], ours: str, targets: dict[str, int]) -> dict[str, Any]:
     """How many times faster we are, by medians, against what is asked."""
     return {
-        name: {
-            "ratio": times[name]["median"] / times[ours]["median"],
-            "target": target,
-            "met": times[name]["median"] >= target * times[ours]["median"],
-        }
+        f"{ours}, times faster than {name}": at_least(
+            times[name]["median"] / times[ours]["median"], target
+        )
         for name, target in targets.items()
         if name in times
     }
