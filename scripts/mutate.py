@@ -25,7 +25,8 @@ LAWS = [
     for name in ("linalg", "motions", "components", "linear_world", "textbook", "starts")
 ]
 LAWS += ["tests/laws/test_symmetries.py"]
-KERNELS = ["tests/lanes", "tests/laws/test_runs.py"]  # for faults of the compiler and the runs
+KERNELS = [f"tests/lanes/test_{name}.py" for name in ("refusals", "program", "elementary")]
+KERNELS += ["tests/lanes/test_kernels.py", "tests/laws/test_runs.py", "tests/lanes/test_cache.py"]
 COMPILED = ("lanes/", "filters/recursion")
 WANTED = 0.9
 PATIENCE_S = 900

@@ -6,16 +6,7 @@ import pytest
 from boresight.lanes import Kernel, Rate, Scalar, Vector, pack_states, simd, trace
 from boresight.lanes.writer import Shape
 
-
-def _runs_here(goal):
-    has = simd._llvm().get_host_cpu_features() if simd._llvm() else {}
-    needs = {"avx512": ("avx512f", "avx512dq", "avx512vl", "avx512bw"), "avx2": ("avx2", "fma")}
-    if goal.name == "sse2":
-        return bool(has.get("sse2"))
-    return bool(simd._llvm()) and all(has.get(feature) for feature in needs.get(goal.name, ()))
-
-
-COMPILED = tuple(goal for goal in simd.TARGETS.values() if _runs_here(goal))
+COMPILED = simd.available()
 NUMPY = None  # a kernel without code runs its program in NumPy
 EVERY = (*COMPILED, NUMPY)
 

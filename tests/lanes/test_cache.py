@@ -200,10 +200,20 @@ def test_the_environment_chooses_the_target(name):
     np.testing.assert_allclose(y, formula(*x.T), rtol=1e-13)
 
 
-def test_a_target_that_does_not_exist_is_refused(monkeypatch):
-    monkeypatch.setenv("BORESIGHT_TARGET", "z80")
-    with pytest.raises(UsageError, match="z80"):
+@pytest.mark.parametrize("name", ["z80", "avx512"])
+def test_a_target_that_this_machine_cannot_run_is_refused(name, monkeypatch):
+    """Code for another processor would load, and die of an illegal instruction."""
+    lesser = tuple(goal for goal in COMPILED if goal.name != "avx512")
+    monkeypatch.setattr(simd, "available", lambda: lesser)
+    monkeypatch.setenv("BORESIGHT_TARGET", name)
+    with pytest.raises(UsageError, match=name):
         simd.target.__wrapped__()
+
+
+def test_without_a_compiler_numpy_does_the_work(monkeypatch):
+    monkeypatch.setattr(simd, "available", tuple)
+    monkeypatch.delenv("BORESIGHT_TARGET", raising=False)
+    assert simd.target.__wrapped__() is None
 
 
 @compiled_targets

@@ -14,6 +14,7 @@ from boresight.lanes import (
     Scalar,
     Symmetric,
     Vector,
+    copysign,
     gradient,
     jacobian,
     make_kernel,
@@ -268,3 +269,53 @@ def test_jacobians_of_vector_formulas():
     np.testing.assert_allclose(value, [x * y, x * x / y, x - y, 3 * y, r, 0], rtol=1e-15)
     expected = [[y, x], [2 * x / y, -x * x / y**2], [1, -1], [0, 3], [x / r, y / r], [0, 0]]
     np.testing.assert_allclose(J, expected, rtol=1e-15)
+
+
+def test_gradients_of_elementary_functions():
+    """Against the derivatives in any table, at a point where no two of them agree."""
+    x, y = 0.7, 1.9
+
+    def f(v):
+        a, b = v
+        return np.array(
+            [
+                np.sin(a) + b,
+                np.cos(a) - b,
+                np.exp(a) * b,
+                np.log(a) / b,
+                np.sqrt(a) - b,
+                np.arctan2(a, b),
+                np.arctan2(a, np.array(2.0)[()] + 0.0 * b),
+                1.0 / a,
+                2.0 - a,
+                -a,
+                a**3,
+                a**-2,
+                a**0.5,
+                np.floor(a) + b,
+                select(a < b, a * b, a),
+                copysign(b, -a) * 1.0,
+            ]
+        )
+
+    slopes = [
+        [np.cos(x), 1],
+        [-np.sin(x), -1],
+        [np.exp(x) * y, np.exp(x)],
+        [1 / (x * y), -np.log(x) / y**2],
+        [0.5 / np.sqrt(x), -1],
+        [y / (x**2 + y**2), -x / (x**2 + y**2)],
+        [2.0 / (x**2 + 4), 0],
+        [-1 / x**2, 0],
+        [-1, 0],
+        [-1, 0],
+        [3 * x**2, 0],
+        [-2 / x**3, 0],
+        [0.5 / np.sqrt(x), 0],
+        [0, 1],
+        [y, x],
+        [0, -1],
+    ]
+    value, J = jacobian(f, np.array([x, y]))
+    np.testing.assert_allclose(value, f(np.array([x, y])), rtol=1e-15)
+    np.testing.assert_allclose(J, slopes, rtol=1e-14)

@@ -224,6 +224,14 @@ def test_a_legal_formula_gives_what_it_gives_on_floats(name):
         np.testing.assert_allclose(y, expected, rtol=1e-12, atol=1e-13)
 
 
+def test_what_touches_no_symbol_cannot_be_noticed_and_shows_as_nan():
+    """The documented gap: `np.nan_to_num` gives objects back as they are."""
+    from lanes.machines import evaluate
+
+    y = evaluate(lambda x: np.nan_to_num(np.array([x]))[0] + 1.0, None, np.array([np.nan, 2.0]))
+    np.testing.assert_array_equal(y, [np.nan, 3.0])
+
+
 def test_gradients_refuse_on_floats_what_they_refuse_on_symbols():
     """Outside a trace too: a dual number that were always true would take one branch in silence."""
     x = np.array([2.0, 3.0])

@@ -199,14 +199,16 @@ def isnan(x: Any) -> Any:
 
 
 def copysign(magnitude: Any, sign: Any) -> Any:
-    """Magnitude of the first with the sign of the second; floats and symbols."""
+    """Magnitude of the first with the sign of the second; floats, symbols and dual numbers."""
+    sign = _value(sign)
+    if isinstance(magnitude, Dual):
+        slope = copysign(1.0, magnitude.value) * copysign(1.0, sign)
+        return magnitude.chain(copysign(magnitude.value, sign), slope)
     if isinstance(sign, Symbol):
         return sign.graph.apply("copysign", sign.lift(magnitude), sign)  # type: ignore[arg-type]
-    if isinstance(sign, Dual):
-        return copysign(magnitude, sign.value)
-    return (
-        magnitude.copysign(sign) if isinstance(magnitude, Symbol) else np.copysign(magnitude, sign)
-    )
+    if isinstance(magnitude, Symbol):
+        return magnitude.copysign(sign)
+    return np.copysign(magnitude, sign)
 
 
 def _seed(x: Array) -> Array:

@@ -41,6 +41,7 @@ class Target:
     attributes: str = ""
 
 
+_AVX512 = ("avx512f", "avx512dq", "avx512vl", "avx512bw", "avx512cd")
 _WIDE = '"prefer-vector-width"="512" "min-legal-vector-width"="512"'
 TARGETS = {
     "avx512": Target("avx512", "x86-64-v4", "-prefer-256-bit", 8, attributes=_WIDE),
@@ -64,24 +65,33 @@ def _llvm() -> Any:
 
 
 @cache
+def available() -> tuple[Target, ...]:
+    """The levels this machine can run, best first; none where there is no compiler."""
+    llvm = _llvm()
+    if llvm is None:
+        return ()
+    has = llvm.get_host_cpu_features()
+    x86 = llvm.get_process_triple().startswith("x86_64")
+    needs = {"avx512": _AVX512, "avx2": ("avx2", "fma"), "sse2": ()}
+    vectors = [n for n, features in needs.items() if x86 and all(has.get(f) for f in features)]
+    return tuple(TARGETS[name] for name in (*vectors, "generic"))
+
+
+@cache
 def target() -> Target | None:
     """The best level of this machine, or what BORESIGHT_TARGET says; None means NumPy."""
-    llvm, wanted = _llvm(), os.environ.get("BORESIGHT_TARGET", "")
-    if wanted == "numpy" or llvm is None:
+    wanted = os.environ.get("BORESIGHT_TARGET", "")
+    if wanted == "numpy" or not available():
         return None
-    if wanted:
-        if wanted not in TARGETS:
-            raise UsageError(
-                f"BORESIGHT_TARGET={wanted!r} is not a target",
-                next_step=f"use one of {', '.join((*TARGETS, 'numpy'))}",
-            )
-        return TARGETS[wanted]
-    if not llvm.get_process_triple().startswith("x86_64"):
-        return TARGETS["generic"]
-    has = llvm.get_host_cpu_features()
-    if all(has.get(f) for f in ("avx512f", "avx512dq", "avx512vl", "avx512bw", "avx512cd")):
-        return TARGETS["avx512"]
-    return TARGETS["avx2" if has.get("avx2") and has.get("fma") else "sse2"]
+    if not wanted:
+        return available()[0]
+    for goal in available():
+        if goal.name == wanted:
+            return goal
+    raise UsageError(
+        f"BORESIGHT_TARGET={wanted!r} is not a target of this machine",
+        next_step=f"use one of {', '.join((*(goal.name for goal in available()), 'numpy'))}",
+    )
 
 
 @cache
