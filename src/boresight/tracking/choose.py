@@ -1,6 +1,8 @@
 """Which noise to track with: measured, then chosen by likelihood on the first half."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from boresight.tracking.noise import Noise
 
 Array = Any
 ACCELERATIONS = (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.6, 2.5, 4.0)  # m/s² per root hertz
-WIDENINGS = (1.0, 1.5, 2.5)
+WIDENINGS = (1.5, 2.5)
 ENOUGH = 20_000  # plots to choose by: more would cost time, not certainty
 WARM_UP = 8  # plots after a start until its velocity is settled
 
@@ -52,6 +54,13 @@ def warmed_up(flights: Flights, started: Array) -> Array:
     return rows - latest >= WARM_UP
 
 
+def _peak(score: Callable[[float], float]) -> float:
+    """The best of ACCELERATIONS: of every other one, then of its neighbours."""
+    best = max(ACCELERATIONS[::2], key=score)
+    place = ACCELERATIONS.index(best)
+    return max(ACCELERATIONS[max(place - 1, 0) : place + 2], key=score)
+
+
 def choose_noise(
     flights: Flights, straight: Array, measured: Noise, chosen: Filter, site: Site, until: float
 ) -> Noise:
@@ -69,6 +78,7 @@ def choose_noise(
     part = Flights(flights.time[rows], flights.z[rows], flights.track[rows])
     dims = flights.z.shape[1]
 
+    @cache
     def score(widening: float, acceleration: float) -> float:
         noise = replace(
             measured,
@@ -81,12 +91,14 @@ def choose_noise(
         scored = straight[rows] & warmed_up(part, result.started) & (result["dof"] > 0)
         return float(np.mean(result["loglik"][scored])) if scored.any() else -np.inf
 
-    best = max(ACCELERATIONS, key=lambda a: score(1.0, a))
-    near = ACCELERATIONS.index(best)
-    candidates = [(1.0, best)] + [
-        (w, a) for w in WIDENINGS[1:] for a in ACCELERATIONS[max(near - 2, 0) : near + 1]
-    ]
-    widening, acceleration = max(candidates, key=lambda pair: score(*pair))
+    acceleration = _peak(lambda a: score(1.0, a))
+    widening, best = 1.0, score(1.0, acceleration)
+    for wider in WIDENINGS:  # more sensor noise asks for less process noise
+        place = ACCELERATIONS.index(acceleration)
+        found = max((score(wider, a), a) for a in ACCELERATIONS[max(place - 1, 0) : place + 1])
+        if found[0] <= best:
+            break
+        widening, (best, acceleration) = wider, found
     return replace(
         measured,
         range_m=measured.range_m * widening,
