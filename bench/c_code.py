@@ -160,8 +160,8 @@ def write_c(program: Program, form: str) -> str:
         program: lowered program (`elementary.lower`).
         form: "lanes" or "vectors".
     """
-    arrays = ["old", "fresh", *(f"in{i}" for i in range(len(program.inputs)))]
-    arrays += [f"out{i}" for i in range(len(program.outputs))]
+    arrays = ["old", "fresh", *(f"out{i}" for i in range(len(program.outputs)))]
+    arrays += [f"in{i}" for i in range(len(program.inputs))]
     parameters = ["i64 from", "i64 to", "i64 steps", *(f"double* __restrict {a}" for a in arrays)]
     words = ["f[0]", "f[1]", "f[2]", *(f"(double*)f[{4 + i}]" for i in range(len(arrays)))]
     lines = [_HEAD, f"static inline void run({', '.join(parameters)}) {{"]

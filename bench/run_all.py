@@ -1,7 +1,7 @@
 """Run every bench that can run here, and print what is asked beside what was measured.
 
-Each script writes bench/results/<name>.json; its `targets` fill the table. A script whose packages
-or tools are missing is skipped, and the table says why.
+What each script prints is kept as bench/results/<name>.json; its `targets` fill the table. A script
+whose packages or tools are missing is skipped, and the table says why.
 """
 
 import json

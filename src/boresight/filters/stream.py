@@ -97,14 +97,18 @@ class Stream:
         count = self._components * self._lanes
         self._buffer_type: Any = ctypes.c_double * (self._clock + 1 + count)
         self._pack = struct.Struct(f"{1 + count}d").pack_into
+        self._summary_at, self._clock_at = 8 * self._state_numbers, 8 * self._clock  # bytes
         names = [slot.name for slot in program.inputs]
         if names[:2] != ["z", "dt"]:
             raise AssertionError("the recursion declares the plot and dt first")
         self._keep = [np.ascontiguousarray(self._values[n], dtype=float) for n in names[2:]]
-        self._numbers = tuple(array.ctypes.data for array in self._keep)
         if code:
-            self._call, self._frame = code.call, code.frame.pack
-            self._head = (0, code.chunks(self._lanes), 1, self._lanes)
+            # The words of a call (`Code.frame`): what never changes, packed once, around what does.
+            addresses = [array.ctypes.data for array in self._keep]
+            self._head = struct.pack("4q", 0, code.chunks(self._lanes), 1, self._lanes)
+            self._middle = struct.Struct("5q").pack
+            self._tail = struct.pack(f"{len(addresses)}q", *addresses)
+            self._call = code.call
 
     def start(self, plot: Array | Gaussian, *, speed_mps: float = SPEED_MPS) -> StreamState:
         """Begin from a plot (k,) or (targets, k), or from a Gaussian."""
@@ -151,7 +155,7 @@ class Stream:
         if self.targets is None:
             numbers = plot.tolist() if type(plot) is np.ndarray else plot  # Python floats are quick
             try:
-                self._pack(buffer, 8 * self._clock, dt, *numbers)
+                self._pack(buffer, self._clock_at, dt, *numbers)
             except (struct.error, TypeError):
                 raise self._wrong(plot) from None
         elif np.shape(plot) == (self._lanes, self._components):
@@ -161,8 +165,9 @@ class Stream:
             raise self._wrong(plot)
 
     def _in_kernel(self, old: int, new: int) -> None:
-        summary, clock = new + 8 * self._state_numbers, new + 8 * self._clock
-        self._call(self._frame(*self._head, old, new, clock + 8, clock, *self._numbers, summary))
+        clock = new + self._clock_at
+        varying = self._middle(old, new, new + self._summary_at, clock + 8, clock)
+        self._call(self._head + varying + self._tail)
 
     def _in_numpy(self, old: Any, new: Any) -> None:
         numbers = np.frombuffer(new)

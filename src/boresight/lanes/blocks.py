@@ -114,7 +114,7 @@ class Kernel:
             return self._run_numpy(states, packed, steps)
         new = np.empty_like(states.data)
         outputs = [self._output(slot, states.lanes, steps) for slot in self.program.outputs]
-        arrays = (states.data, new, *packed, *outputs)
+        arrays = (states.data, new, *outputs, *packed)
         addresses = [array.__array_interface__["data"][0] for array in arrays]  # .ctypes is slow
         chunks = self.code.chunks(states.lanes)
         parts = max(1, min(threads, chunks))

@@ -140,7 +140,7 @@ def write_ir(program: Program, shape: Shape, name: str, attributes: str) -> str:
     arguments = [f"%in{i}" for i in range(len(program.inputs))]
     results = [f"%out{i}" for i in range(len(program.outputs))]
     w.line(f"define void @{name}(ptr %frame) {attributes} {{\nentry:")
-    _unpack_frame(w, [*arguments, *results])
+    _unpack_frame(w, [*results, *arguments])
     slots = list(zip(program.inputs, arguments, strict=True))
     for slot, argument in slots:
         if slot.rate == Rate.FIXED:

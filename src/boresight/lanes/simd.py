@@ -24,7 +24,7 @@ from boresight.lanes.ir import BLOCK, write_ir
 from boresight.lanes.program import Program
 from boresight.lanes.writer import Shape
 
-FORMAT = 2  # of the calling convention; part of every cached object's name
+FORMAT = 3  # of the calling convention; part of every cached object's name
 _LOCK = threading.RLock()  # LLVM's contexts are not made for several threads
 _LOADED: dict[str, Any] = {}  # code by name: LLVM never frees a name, nor loads it twice
 
@@ -184,7 +184,7 @@ class Code:
         """What describes a call.
 
         First chunk and the one after the last, steps, lanes; addresses of the old and the new
-        state, the inputs and the outputs.
+        state, the outputs and the inputs.
         """
         return struct.Struct(f"{6 + len(self.program.inputs) + len(self.program.outputs)}q")
 
