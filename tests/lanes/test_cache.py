@@ -132,7 +132,7 @@ def test_the_cache_is_where_the_user_says(monkeypatch, tmp_path):
 
 
 def test_another_program_target_or_layout_is_another_object(kernel_cache):
-    for program in (record(formula, 2), record(lambda x, y: formula(x, y) + 1.0, 2)):
+    for program in (record(formula, 2), record(lambda x, y: x * y + 1.0, 2)):
         for goal in COMPILED:
             for rows in (True, False):
                 simd._compile(program, Shape(goal.width, rows), goal)

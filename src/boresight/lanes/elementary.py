@@ -112,13 +112,13 @@ def cos(x: Any) -> Any:
 
 def exp(x: Any) -> Any:
     """Exponential, 1.2 units in the last place; below -708 it is 0 (no denormals)."""
-    safe = select(x < -708.0, -708.0, select(x > 709.8, 709.8, x))
+    safe = select(x < -708.0, -708.0, select(x > 709.8, 709.8, x))  # whose value is infinite
     k = (safe * (1.0 / math.log(2.0))).rint()
     r = (safe - k * _LN2[0]) - k * _LN2[1]
     series = _horner(tuple(1.0 / math.factorial(i) for i in range(14)), r)
     half = (k * 0.5).floor()
     value = series * half.graph.apply("pow2", half) * half.graph.apply("pow2", k - half)
-    return select(x < -708.0, 0.0, select(x > 709.782712893384, math.inf, value))
+    return select(x < -708.0, 0.0, value)
 
 
 def log(x: Any) -> Any:
