@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from boresight import catalogue
 from boresight.errors import UsageError
 from boresight.filters.recursion import Estimate, run_recursion
-from boresight.filters.start import one_plot
+from boresight.filters.start import one_plot, two_plots
 from boresight.filters.stream import Stream
 from boresight.maths import Gaussian
 from boresight.maths.frames import Site
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from boresight.tracking.result import TrackingResult
 
 Array = Any
+_STARTS = {"one plot": 1, "two plots": 2}
 
 
 def run(
@@ -34,7 +35,7 @@ def run(
     plots: Any,
     *,
     dt: Array | None = None,
-    start: Gaussian | None = None,
+    start: Gaussian | Literal["one plot", "two plots"] | None = None,
     outputs: Sequence[str] = ("mean", "cov", "nis"),
     last: bool = False,
     threads: int = 1,
@@ -50,8 +51,9 @@ def run(
             NaN where nothing was measured.
         dt: seconds before each scan: a number, (1, scans), (runs, 1) or (runs, scans); the first
             scan's dt is the time since `start`. Left out: what `plots` carries.
-        start: Gaussian with mean (n,) or (runs, n). Left out: what `plots` carries, else the
-            first plot (which is then used for the start only).
+        start: Gaussian with mean (n,) or (runs, n); or "one plot" or "two plots": made from the
+            first plots, which are then used for the start only (until then every scan shows the
+            start). Left out: what `plots` carries, else "one plot".
         outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status.
         last: give outputs after the last scan only.
         threads: threads that share the runs; the result does not depend on it.
@@ -71,20 +73,28 @@ def run(
         z = sensor.without_air(z)
     recursion = catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor)
     prior = getattr(plots, "prior", None) if start is None else start
-    if prior is None:
-        prior, z, steps = _start_from_first(z, steps, motion, sensor)
+    if not isinstance(prior, Gaussian):
+        prior, z, steps = _start_from_plots(prior or "one plot", z, steps, motion, sensor)
     return run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
 
 
-def _start_from_first(
-    z: Array, dt: Array, motion: Motion, sensor: Sensor
+def _start_from_plots(
+    how: str, z: Array, dt: Array, motion: Motion, sensor: Sensor
 ) -> tuple[Gaussian, Array, Array]:
-    """A start from the first plot, which is then not used again."""
-    prior = one_plot(z[:, 0], motion, sensor)
+    """A start from the first plots, which are then not used again."""
+    used = _STARTS.get(how, 0)
+    if not used:
+        raise UsageError(
+            f"no start {how!r}", next_step=f"use a Gaussian, or {' or '.join(_STARTS)}"
+        )
+    rows = np.shape(dt)[0] if np.ndim(dt) else 1
+    steps = np.array(np.broadcast_to(np.asarray(dt, dtype=float), (rows, z.shape[1])))
+    if used == 1:
+        prior = one_plot(z[:, 0], motion, sensor)
+    else:
+        prior = two_plots(z[:, 0], z[:, 1], steps[:, 1], motion, sensor)
     rest = z.copy()
-    rest[:, 0] = np.nan
-    steps = np.array(np.broadcast_to(dt, (np.shape(dt)[0] if np.ndim(dt) else 1, z.shape[1])))
-    steps[:, 0] = 0.0
+    rest[:, :used], steps[:, :used] = np.nan, 0.0
     return prior, rest, steps
 
 
