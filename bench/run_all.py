@@ -40,9 +40,11 @@ def run(name: str) -> str:
     done = subprocess.run(
         [sys.executable, str(FOLDER / f"{name}.py")], capture_output=True, text=True, check=False
     )
-    return (
-        "" if done.returncode == 0 else f"failed: {(done.stderr.strip() or '?').splitlines()[-1]}"
-    )
+    if done.returncode:
+        return f"failed: {(done.stderr.strip() or '?').splitlines()[-1]}"
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / f"{name}.json").write_text(done.stdout, encoding="utf-8")
+    return ""
 
 
 def lines(name: str) -> list[str]:
