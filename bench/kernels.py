@@ -84,11 +84,13 @@ def compare(program: Program, values: Mapping[str, Any], given: Scenario) -> dic
     means = {name: k.run(states, blocks, STEPS)[1]["mean"] for name, k in kernels.items()}
     size = np.abs(means["ours blocks"]).max()
     apart = {name: np.abs(m - means["ours blocks"]).max() / size for name, m in means.items()}
+    kept = {"mean": means["ours blocks"]}  # all write into one array: no page is new to anyone
     tasks: dict[str, Callable[[], Any]] = {
-        name: lambda k=k: k.run(states, blocks, STEPS) for name, k in kernels.items()
+        name: lambda k=k: k.run(states, blocks, STEPS, out=kept) for name, k in kernels.items()
     }
     plain = make_kernel(program, rows=True)
-    tasks["ours rows"] = lambda: plain.run(states, rows, STEPS)
+    flat = {"mean": plain.run(states, rows, STEPS)[1]["mean"]}
+    tasks["ours rows"] = lambda: plain.run(states, rows, STEPS, out=flat)
     times = interleaved(tasks, rounds=ROUNDS, per=RUNS * STEPS * 1e-9)
     return verdict(times, apart) | {
         "operations": lower(program, rounding=True).operations,

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from boresight.errors import UsageError
 from boresight.filters import ekf, mekf, posterior
 from boresight.filters.recursion import OUTPUTS, leaves, run_recursion
 from boresight.lanes import (
@@ -295,3 +296,28 @@ def test_gradients_run_in_a_kernel_where_azimuth_is_singular():
         np.testing.assert_allclose(got.mean[lane, 0], expected["mean"], atol=1e-9 * size)
     value, slope = gradient(world.sensor.components(SPACE)[1].value, mean[0])
     assert (value, slope.any()) == (0.0, False)
+
+
+@pytest.mark.parametrize("rows", [True, False])
+def test_outputs_go_into_arrays_that_are_given_and_fit(rows):
+    program = trace(
+        lambda state, given: (
+            {"x": state["x"] + given["z"]},
+            {"y": state["x"] * given["z"]},
+        ),
+        state={"x": Vector(2)},
+        inputs={"z": (Vector(2), Rate.EACH)},
+        outputs={"y": (Vector(2), Rate.EACH)},
+    )
+    kernel = make_kernel(program, rows)
+    z = np.random.default_rng(3).standard_normal((11, 4, 2))
+    given = {"z": z if rows else to_blocks(z)}
+    states = pack_states(program.state, {"x": np.ones((11, 2))})
+    fresh = kernel.run(states, given, 4)[1]["y"]
+    kept = {"y": np.full_like(fresh, np.nan)}
+    again = kernel.run(states, given, 4, out=kept)[1]["y"]
+    assert np.shares_memory(again, kept["y"])
+    assert np.array_equal(kept["y"], fresh)
+    for wrong in (kept["y"][:-1], kept["y"].astype("f4"), np.asfortranarray(kept["y"])):
+        with pytest.raises(UsageError, match="does not fit"):
+            kernel.run(states, given, 4, out={"y": wrong})
