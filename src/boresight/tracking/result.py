@@ -15,8 +15,8 @@ class TrackingResult:
         tracks: one row per track and plot time: `track`, `time_s`, `latitude_deg`,
             `longitude_deg`, `height_m` (above the ellipsoid), `east_m`, `north_m`, `up_m`,
             `east_mps`, `north_mps`, `up_mps` (ENU at the site), `cov_I_J` for I <= J < 6 (upper
-            triangle of the ENU state's covariance), `nis`, `dof`, `status` (`updated`,
-            `rejected`, `restarted`), `address`, `mode_a`, `aircraft_id`, `sensor`.
+            triangle of the ENU state's covariance), `nis`, `dof`, `status` (`started`,
+            `updated`, `rejected`, `restarted`), `address`, `mode_a`, `aircraft_id`, `sensor`.
         residuals: one row per track and plot: `track`, `time_s`, `sensor`, `range_m`,
             `azimuth_deg`, `range_residual_m`, `range_sd_m`, `azimuth_residual_deg`,
             `azimuth_sd_deg`, `height_residual_m`, `height_sd_m`, `nis`, `dof`, `straight`
@@ -31,7 +31,8 @@ class TrackingResult:
         used: number of plots that updated a track.
         rejected: number of plots outside their track's gate.
         filter: the filter's catalogue name.
-        nis: `all`, `straight`, `straight_second_half`: each {`mean`, `median`, `dof`, `scans`}
+        nis: `all`, `straight`, `straight_first_half`, `straight_second_half`, from the ninth plot
+            after each start: each {`mean`, `median`, `dof`, `scans`}
             of the normalised innovation squared per degree of freedom.
         settings: site, sensor, atmosphere, noise and process noise with how they were chosen.
         remarks: sentences for the reader, most important first.
