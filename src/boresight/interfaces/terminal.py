@@ -53,6 +53,7 @@ def show(answer: Answer, manner: Manner) -> None:
             for part in answer.screen(console.width):
                 console.print(part, crop=False)
         sys.stdout.write(screen.get())
+    sys.stdout.flush()  # a reader that has left is noticed here, before anything else is said
     if not manner.is_quiet:
         remark(answer.remarks)
 
