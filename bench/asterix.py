@@ -21,6 +21,7 @@ from typing import Any
 from boresight.formats.decoding import Account
 from boresight.formats.recording import read_recording
 from boresight.formats.stream import stream
+from measure import at_least
 
 # This file is called asterix too, and would be imported in libasterix's place.
 sys.path[:] = [folder for folder in sys.path if Path(folder).resolve() != Path(__file__).parent]
@@ -128,6 +129,8 @@ def main() -> int:
         "rounds": options.rounds,
         "records_per_second": rates,
         "times_aviconv": round(ours / peer, 1) if ours and peer else None,
+        "targets": {"records decoded a second": at_least(rates["boresight"], 500_000)}
+        | ({"times aviconv-asterix": at_least(ours / peer, 30)} if ours and peer else {}),
         "machine": processor(),
         "python": platform.python_version(),
         "versions": {

@@ -18,6 +18,7 @@ SCRIPTS: dict[str, tuple[str, ...]] = {  # packages without which there is nothi
     "kernels": (),
     "peers": ("filterpy", "stonesoup", "dynamax", "nrl-tracker"),
     "startup": (),
+    "commands": ("pytest",),  # whose tests hold the bad files
     "asterix": ("aviconv-asterix", "libasterix"),
 }
 
