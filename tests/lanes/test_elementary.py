@@ -45,6 +45,17 @@ def test_exponential(goal):
 
 @extended
 @compiled_targets
+def test_exponential_less_one(goal):
+    rng = np.random.default_rng(5)
+    tiny = rng.choice([-1, 1], 20_000) * 10.0 ** rng.uniform(-25, 0, 20_000)
+    x = np.concatenate(
+        [rng.uniform(-708, 709.78, 20_000), rng.normal(size=20_000), tiny, [709.782]]
+    )
+    assert ulps(evaluate(np.expm1, goal, x), np.expm1(x.astype(np.longdouble))) <= 1.8
+
+
+@extended
+@compiled_targets
 def test_logarithm(goal):
     rng = np.random.default_rng(3)
     powers = 10.0 ** rng.uniform(-300, 300, 20_000)
@@ -83,6 +94,14 @@ def test_arctan2(goal):
         (np.exp, inf, inf),
         (np.exp, -800.0, 0.0),
         (np.exp, -inf, 0.0),
+        (np.expm1, 0.0, 0.0),
+        (np.expm1, -0.0, -0.0),
+        (np.expm1, 1e-300, 1e-300),
+        (np.expm1, 710.0, inf),
+        (np.expm1, inf, inf),
+        (np.expm1, -1e10, -1.0),
+        (np.expm1, -inf, -1.0),
+        (np.expm1, nan, nan),
         (np.log, 1.0, 0.0),
         (np.log, 0.0, -inf),
         (np.log, -0.0, -inf),

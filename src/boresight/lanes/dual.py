@@ -96,6 +96,10 @@ class Dual:
         value = np.exp(self.value)
         return self.chain(value, value)
 
+    def expm1(self) -> "Dual":
+        """Exponential less one, exact near zero."""
+        return self.chain(np.expm1(self.value), np.exp(self.value))
+
     def log(self) -> "Dual":
         """Natural logarithm."""
         return self.chain(np.log(self.value), 1.0 / self.value)

@@ -32,6 +32,7 @@ FOLD: dict[str, Callable[..., Any]] = {
     "abs": np.abs,
     "sqrt": np.sqrt,
     "exp": np.exp,
+    "expm1": np.expm1,
     "log": np.log,
     "sin": np.sin,
     "cos": np.cos,
@@ -203,7 +204,8 @@ class Symbol:
     __and__, __rand__ = _operator("and"), _reflected("and")
     __or__, __ror__ = _operator("or"), _reflected("or")
     __neg__, __abs__, __invert__ = _function("neg"), _function("abs"), _function("not")
-    sqrt, exp, log = _function("sqrt"), _function("exp"), _function("log")
+    sqrt, log = _function("sqrt"), _function("log")
+    exp, expm1 = _function("exp"), _function("expm1")
     sin, cos = _function("sin"), _function("cos")
     rint, floor, fabs = _function("rint"), _function("floor"), _function("abs")
     isnan, __floor__ = _function("isnan"), _function("floor")
