@@ -89,7 +89,8 @@ def choose_noise(
         )
         result = fly(part, recursion_for(chosen, noise, site, dims), site)
         scored = straight[rows] & warmed_up(part, result.started) & (result["dof"] > 0)
-        return float(np.mean(result["loglik"][scored])) if scored.any() else -np.inf
+        mean = float(np.mean(result["loglik"][scored])) if scored.any() else -np.inf
+        return mean if np.isfinite(mean) else -np.inf  # a filter that fails is never the best
 
     acceleration = _peak(lambda a: score(1.0, a))
     widening, best = 1.0, score(1.0, acceleration)

@@ -27,7 +27,7 @@ SPEED_MPS = 200.0  # spread of a new track's velocity, horizontal
 CLIMB_MPS = 15.0  # and vertical: 3,000 feet a minute
 OFFSET_M = 200.0  # spread of pressure altitude about height: pressure and temperature of the day
 CELLS = 60_000  # lanes times steps of one call: bounds the memory
-OUTPUTS = ("mean", "cov", "nis", "dof", "loglik", "innovation", "variance", "inside")
+OUTPUTS = ("mean", "cov", "nis", "dof", "loglik", "innovation", "variance", "status", "inside")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +129,13 @@ def _run(
     dt = np.diff(flights.time[rows], axis=1, prepend=flights.time[rows[:, :1]])
     start = begin(z[:, 0], recursion, site)
     z[:, 0] = np.nan  # it made the start; using it again would count it twice
+    estimate = run_recursion(gated(recursion, dt), z, dt, start, outputs=OUTPUTS)
+    for name in OUTPUTS:
+        values[name][rows[there]] = getattr(estimate, name)[there]
+
+
+def gated(recursion: Recursion, dt: Array) -> Recursion:
+    """The same with the gate that every track has, for plots dt seconds apart."""
     gate = ManoeuvreGate(
         half_dt2=0.5 * dt * dt,
         accel_mps2=MANOEUVRE_MPS2,
@@ -136,10 +143,7 @@ def _run(
         limit=GATE,
         dims=recursion.motion.dims,
     )
-    guarded = replace(recursion, guard=gate)
-    estimate = run_recursion(guarded, z, dt, start, outputs=OUTPUTS)
-    for name in OUTPUTS:
-        values[name][rows[there]] = getattr(estimate, name)[there]
+    return replace(recursion, guard=gate)
 
 
 def begin(z: Array, recursion: Recursion, site: Site) -> Gaussian:

@@ -74,6 +74,7 @@ def measure(flights: Flights, scan_s: float) -> Noise:
     rows = first[:, None] + np.arange(WINDOW)
     azimuth = np.unwrap(flights.z[rows, 1], axis=1)
     far = flights.z[rows, 0].min(axis=1) > 5_000.0  # nearby, azimuth is not a cubic of time
+    altitude = flights.z[:, 2] if flights.z.shape[1] == 3 else np.full(len(flights.time), np.nan)
     return Noise(
         range_m=_spread(flights.time[rows], flights.z[rows, 0], _quantum(flights.z[:, 0]), 30.0),
         azimuth_deg=float(
@@ -81,7 +82,7 @@ def measure(flights: Flights, scan_s: float) -> Noise:
                 _spread(flights.time[rows][far], azimuth[far], _quantum(flights.z[:, 1]), 1.5e-3)
             )
         ),
-        altitude_m=_spread(flights.time[rows], flights.z[rows, 2], _quantum(flights.z[:, 2]), 10.0),
+        altitude_m=_spread(flights.time[rows], altitude[rows], _quantum(altitude), 10.0),
         accel_mps2=1.0,
     )
 

@@ -35,6 +35,10 @@ class TrackingResult:
             after each start: each {`mean`, `median`, `dof`, `scans`}
             of the normalised innovation squared per degree of freedom.
         settings: site, sensor, atmosphere, noise and process noise with how they were chosen.
+        filters: one row per filter, side by side; the first is the one whose tracks these are.
+        scores: one row per filter and plot it was scored on: `filter`, `track`, `time_s`, `nis`,
+            `dof`, `loglik`, `gain` (its log-likelihood minus the first filter's; null where that
+            was not scored), `straight`. None where filters were not compared.
         remarks: sentences for the reader, most important first.
     """
 
@@ -48,7 +52,72 @@ class TrackingResult:
     filter: str
     nis: dict[str, dict[str, float]]
     settings: dict[str, Any]
+    filters: "list[FilterRow]" = field(default_factory=list)
+    scores: "pl.DataFrame | None" = None
     remarks: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain:
+    """A mean difference of log-likelihoods per plot.
+
+    Attributes:
+        mean: in nats; NaN where no plot is behind it.
+        ci95: its 95 % interval, a track being one cluster; NaN with fewer than two tracks.
+        plots, tracks: how many are behind it.
+    """
+
+    mean: float
+    ci95: tuple[float, float]
+    plots: int
+    tracks: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterRow:
+    """One filter on a recording without known truth, beside others on the same plots.
+
+    What is scored is scored in the second half of the recording, which the noise was not chosen
+    on, at plots inside the gate that come at least eight after their track's latest start.
+
+    Attributes:
+        filter: catalogue name.
+        updates, rejected, restarts: plots it used, plots outside its gate, tracks started anew.
+        failed_share: of plots after which its state was not finite or not positive definite.
+        scored: number of plots scored.
+        nis_per_dof, nis_median: normalised innovation squared per degree of freedom in straight
+            flight, mean and median.
+        loglik: mean log-likelihood of a plot given those before it, as a density over what the
+            sensor measures (metres, radians).
+        gain, gain_straight: its log-likelihood minus the first filter's over the plots that both
+            were scored on, and over those in straight flight; positive where it predicts better.
+        range_sd_m, azimuth_sd_deg: scatter of measured minus predicted, half the width of the
+            middle 68 %.
+        speed_error_median_mps, speed_error_95_mps: median and 95 % quantile of the difference from
+            the downlinked ground speed, which no filter saw; NaN where none is told.
+        speeds: number of downlinked speeds behind these.
+        ns_per_update: processor time of one prediction, gate and update, compiled and alone.
+        remark: a sentence where something went wrong, else empty.
+    """
+
+    filter: str
+    updates: int
+    rejected: int
+    restarts: int
+    failed_share: float
+    scored: int
+    nis_per_dof: float
+    nis_median: float
+    loglik: float
+    gain: "Gain"
+    gain_straight: "Gain"
+    range_sd_m: float
+    azimuth_sd_deg: float
+    speed_error_median_mps: float
+    speed_error_95_mps: float
+    speeds: int
+    ns_per_update: float
+    remark: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
