@@ -14,7 +14,6 @@ import numpy as np
 import boresight as bs
 import formulas
 from boresight import catalogue
-from boresight.filters.recursion import start_states
 from boresight.lanes import (
     Kernel,
     Leaf,
@@ -23,6 +22,7 @@ from boresight.lanes import (
     Symmetric,
     Vector,
     make_kernel,
+    pack_states,
     to_blocks,
     trace,
 )
@@ -76,7 +76,7 @@ def rivals(kernel: Kernel) -> dict[str, Kernel]:
 
 def compare(program: Program, values: Mapping[str, Any], given: Scenario) -> dict[str, Any]:
     """Our kernel in both layouts against all of gcc's, and how far the results lie apart."""
-    states = start_states(given.start, RUNS)
+    states = pack_states(program.state, given.start._asdict())
     rows = dict(values) | {"dt": DT, "z": given.z}
     blocks = rows | {"z": to_blocks(given.z)}
     ours = make_kernel(program, rows=False)
@@ -120,7 +120,7 @@ def layouts() -> dict[str, Any]:
     """What packing costs: one step of 1,000 tracks, and the public calls around the kernel."""
     space = straight(RUNS, STEPS)
     program, values = mekf()
-    states = start_states(space.start, RUNS)
+    states = pack_states(program.state, space.start._asdict())
     one = dict(values) | {"dt": DT, "z": np.ascontiguousarray(space.z[:, :1])}
     blocked = one | {"z": to_blocks(one["z"])}
     rows, blocks = make_kernel(program, rows=True), make_kernel(program, rows=False)

@@ -13,6 +13,7 @@ from boresight.experiments.simulate import simulate
 from boresight.filters import mekf
 from boresight.filters.kalman import predict
 from boresight.filters.recursion import Estimate, Recursion, run_recursion
+from boresight.filters.steps import Updating
 from boresight.maths import Gaussian, jacobian
 from boresight.models.motion import SphericalUnitRate, Static
 from boresight.models.sensors import Radar
@@ -83,7 +84,7 @@ def test_a4_artificial_mean_is_half_of_what_is_printed():
     )
     radar = Radar(range_m=1.0, azimuth_deg=np.degrees(noise), elevation_deg=np.degrees(noise))
     prior = Gaussian(np.array([r, 0.0, 0.0]), np.diag([1e-6, 900.0, 900.0]))
-    recursion = Recursion(mekf.update_block, (), Static(dims=3), radar)
+    recursion = Recursion(Updating(formula=mekf.update_block), Static(dims=3), radar)
     found = run_recursion(recursion, z[:, None], 0.0, prior, outputs=("innovation",))
     residual = found.innovation[:, 0, 0]
     longer = np.mean(z[:, 0]) - r

@@ -11,6 +11,7 @@ from boresight.experiments.scenario import lookup
 from boresight.experiments.simulate import simulate
 from boresight.filters import mekf
 from boresight.filters.recursion import Recursion, run_recursion
+from boresight.filters.steps import Updating
 from boresight.maths import Gaussian, gradient
 from boresight.models.motion import ConstantVelocity, Static
 from boresight.models.sensors import Radar
@@ -49,7 +50,8 @@ def tangent(elevation, sd_m, draws, seed):
 
 
 def ours(update, point, cov, z, outputs=("innovation",), **settings):
-    recursion = Recursion(update, tuple(sorted(settings.items())), Static(dims=3), RADAR)
+    method = Updating(formula=update, settings=tuple(sorted(settings.items())))
+    recursion = Recursion(method, Static(dims=3), RADAR)
     return run_recursion(recursion, z[:, None], 0.0, Gaussian(point, cov), outputs=outputs)
 
 
@@ -152,7 +154,8 @@ def test_k4_every_reading_is_the_extended_filter_where_nothing_curves(mu):
     z = textbook.polar(mean) + 2 * sigmas * generator.standard_normal(3)
     expected, expected_cov = textbook.extended_update(mean, cov, z, np.diag(sigmas**2))
     radar = Radar(range_m=0.1, azimuth_deg=np.degrees(1e-4), elevation_deg=np.degrees(1e-4))
-    recursion = Recursion(mekf.update, (("mu", mu),), Static(dims=3), radar)
+    method = Updating(formula=mekf.update, settings=(("mu", mu),))
+    recursion = Recursion(method, Static(dims=3), radar)
     found = run_recursion(recursion, z[None, None], 0.0, Gaussian(mean, cov))
     sd = np.sqrt(np.diag(expected_cov))
     assert np.max(np.abs(found.mean[0, 0] - expected) / sd) < 1e-3

@@ -12,8 +12,9 @@ from boresight.experiments.scenario import lookup, scenario_names
 from boresight.experiments.simulate import root_of, simulate
 from boresight.lanes import Scalar
 from boresight.maths.seeds import Stream, normals
+from boresight.models.coordinates import PositionSensor
 from boresight.models.motion import ConstantVelocity, Static
-from boresight.models.sensors import PositionSensor, Radar
+from boresight.models.sensors import Radar
 
 PAPERS_SCENARIOS = (
     "kashyap-set-1",

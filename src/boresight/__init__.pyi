@@ -20,14 +20,16 @@ from boresight.maths.gaussian import Gaussian as Gaussian
 from boresight.models.atmosphere import EffectiveEarth as EffectiveEarth
 from boresight.models.atmosphere import ExponentialAtmosphere as ExponentialAtmosphere
 from boresight.models.atmosphere import NoAtmosphere as NoAtmosphere
+from boresight.models.coordinates import CartesianPlots as CartesianPlots
+from boresight.models.coordinates import PositionSensor as PositionSensor
 from boresight.models.motion import ConstantAcceleration as ConstantAcceleration
 from boresight.models.motion import ConstantVelocity as ConstantVelocity
 from boresight.models.motion import CoordinatedTurn as CoordinatedTurn
 from boresight.models.motion import SphericalUnitRate as SphericalUnitRate
 from boresight.models.motion import Static as Static
+from boresight.models.motion import WithHeightOffset as WithHeightOffset
 from boresight.models.sensors import Bearings as Bearings
 from boresight.models.sensors import Pose as Pose
-from boresight.models.sensors import PositionSensor as PositionSensor
 from boresight.models.sensors import Radar as Radar
 
 __version__: str

@@ -14,37 +14,37 @@ _FILTERS = {
     for f in (
         Filter(
             name="kf",
-            update=kalman.update_plot,
+            formula=kalman.update_plot,
             summary="linear Kalman filter, for sensors that measure coordinates",
             paper="kalman1960",
         ),
         Filter(
             name="ekf",
-            update=ekf.update,
+            formula=ekf.update,
             summary="extended Kalman filter, all components at once",
             paper="jazwinski1970",
         ),
         Filter(
             name="ekf-sequential",
-            update=ekf.update_sequential,
+            formula=ekf.update_sequential,
             summary="extended Kalman filter, one component after the other",
             paper="jazwinski1970",
         ),
         Filter(
             name="iekf",
-            update=ekf.update_iterated,
+            formula=ekf.update_iterated,
             summary="iterated extended Kalman filter (Gauss-Newton)",
             paper="bell1993",
         ),
         Filter(
             name="mekf",
-            update=mekf.update,
+            formula=mekf.update,
             summary="modified extended Kalman filter: elevation, azimuth, then corrected range",
             paper="kashyap",
         ),
         Filter(
             name="mekf-block",
-            update=mekf.update_block,
+            formula=mekf.update_block,
             summary="modified extended Kalman filter, all components at once",
             paper="aditya",
         ),
@@ -75,7 +75,7 @@ def cite(name: str) -> dict[str, str]:
     found = re.search(rf"^@\w+\{{{re.escape(entry.paper)},.*?^\}}", text, re.MULTILINE | re.DOTALL)
     if found is None:
         raise UsageError(f"papers.bib has no entry {entry.paper!r}, which {name!r} names")
-    doc = getdoc(getmodule(entry.update)) or ""
+    doc = getdoc(getmodule(entry.formula)) or ""
     differs = re.search(
         r"^Differs from (?:it|them)[:,]\s*(.*?)(?:\n\n|\Z)", doc, re.MULTILINE | re.DOTALL
     )

@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 
 from boresight import catalogue
+from boresight.filters.posterior import Posterior
+from boresight.maths import Gaussian
 from boresight.maths.frames import Site
+from boresight.models.coordinates import CartesianPlots, PositionSensor
 from boresight.models.motion import (
     ConstantAcceleration,
     ConstantVelocity,
@@ -15,7 +18,7 @@ from boresight.models.motion import (
     Static,
     WithHeightOffset,
 )
-from boresight.models.sensors import Pose, PositionSensor, Radar
+from boresight.models.sensors import Pose, Radar
 
 km, deg, mrad = 1e3, np.pi / 180, 1e-3
 SITE = Site(latitude_deg=51.1, longitude_deg=1.2, height_m=45.0)
@@ -56,6 +59,8 @@ ALL = Radar(
 )
 POINT = PositionSensor(x_m=20.0, y_m=35.0, z_m=50.0)
 FLAT = PositionSensor(x_m=20.0, y_m=35.0)
+CHIRP = Radar(range_m=30.0, azimuth_deg=0.8, range_rate_mps=2.0, range_rate_correlation=-0.7)
+OBLONG = CartesianPlots(cov=np.array([[900.0, -500.0], [-500.0, 400.0]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,11 +117,10 @@ class Entry:
 
     def update(self, world, mean, cov, z):
         """The formula itself, on floats: Posterior of one target."""
-        from boresight.maths import Gaussian
-
-        chosen = catalogue.lookup(self.name).with_settings(**self.settings)
-        components = world.sensor.components(world.motion)
-        return chosen.update(Gaussian(mean, cov), z, components, **dict(chosen.settings))
+        method, models = self.recursion(world).method, (world.motion, world.sensor)
+        state = method.begin(Gaussian(mean, cov), *models)
+        state, surprise = method.update(state, z, *models)
+        return Posterior(*method.output(state, *models), *surprise)
 
 
 RANGE_FIRST = ("range_m", "azimuth_rad", "elevation_rad")
@@ -135,13 +139,14 @@ FILTERS = (
 )
 CURVED = tuple(entry for entry in FILTERS if entry.curved)
 
-LINEAR_WORLDS = (World(SPACE, POINT), World(PLANE, FLAT))
+LINEAR_WORLDS = (World(SPACE, POINT), World(PLANE, FLAT), World(PLANE, OBLONG))
 POLAR_WORLDS = (
     World(SPACE, POLAR),
     World(PLANE, PLANAR),
     World(SPACE, MOVING),
     World(CoordinatedTurn(accel_mps2=1.0, turn_accel_degps2=0.3), PLANAR),
     World(WithHeightOffset(inner=SPACE, drift_m_per_sqrt_s=2.0), ALL),
+    World(PLANE, CHIRP),
 )
 MOTIONS = (
     PLANE,

@@ -78,7 +78,7 @@ def test_the_batch_is_the_formula_on_floats(entry, world):
     recursion = entry.recursion(world)
     batch = run_recursion(recursion, z, 2.0, start, outputs=OUTPUTS)
     for lane in range(LANES):
-        state = {"mean": start.mean[lane], "cov": start.cov[lane]}
+        state = recursion.begin(start.mean[lane], start.cov[lane])
         for t in range(STEPS):
             state, results = recursion.step(state, {"z": z[lane, t], "dt": 2.0})
             for name in OUTPUTS:

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from boresight.errors import UsageError
 from boresight.filters.start import from_polar, one_plot, random_draw, two_plots
 from boresight.maths import Gaussian
+from boresight.models.coordinates import PositionSensor
 from boresight.models.motion import ConstantVelocity
-from boresight.models.sensors import PositionSensor, Radar
+from boresight.models.sensors import Radar
 from laws.enrolled import MOTIONS, PLANAR, PLANE, POINT, POLAR, POSE, SPACE
 from laws.test_components import derivative
 from oracles import filters as textbook

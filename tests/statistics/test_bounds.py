@@ -10,8 +10,8 @@ from boresight.experiments.metrics import rmse
 from boresight.experiments.montecarlo import filtered
 from boresight.experiments.scenario import lookup
 from boresight.experiments.simulate import simulate
+from boresight.models.coordinates import PositionSensor
 from boresight.models.motion import ConstantVelocity, SphericalUnitRate
-from boresight.models.sensors import PositionSensor
 from oracles import textbook
 
 ACCEL_DENSITY = 0.5

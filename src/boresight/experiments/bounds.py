@@ -65,7 +65,8 @@ def _step(
     """Covariance of a filter that knows where to linearise."""
     cov = predict(Gaussian(state["before"], state["cov"]), motion, inputs["dt"]).cov
     now = Gaussian(inputs["now"], cov)
-    for component, measured in zip(sensor.components(motion), inputs["z"], strict=True):
+    plot, components = sensor.independent(inputs["z"], motion)
+    for component, measured in zip(components, plot, strict=True):
         _, h = gradient(component.value, inputs["now"])
         there = select(missing(measured), 0.0, 1.0)
         now, _ = condition(now, h, 0.0, component.sigma * component.sigma, there)

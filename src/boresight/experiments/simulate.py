@@ -171,7 +171,9 @@ def _step(
     moved = motion.move(state["state"], inputs["dt"]) + inputs["root"] @ inputs["pushes"]
     seen = [
         (c, c.value(moved) + c.sigma * noise)
-        for c, noise in zip(sensor.components(motion), inputs["noise"], strict=True)
+        for c, noise in zip(
+            sensor.components(motion), sensor.coloured(inputs["noise"]), strict=True
+        )
     ]
     z = np.array([wrap(value) if c.is_angle else value for c, value in seen])
     return {"state": moved}, {"state": moved, "z": z}

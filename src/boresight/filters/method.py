@@ -1,11 +1,14 @@
-"""A filter as the catalogue lists it: a formula with a name, settings and a source."""
+"""A filter as the catalogue lists it: a formula or a method with a name, settings and a source."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from inspect import signature
 from typing import Any
 
 from boresight.errors import UsageError
-from boresight.filters.recursion import Recursion, Update
+from boresight.filters import kalman
+from boresight.filters.recursion import Recursion
+from boresight.filters.steps import Method, Predict, Update, Updating
 from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
 
@@ -16,21 +19,24 @@ class Filter:
 
     Attributes:
         name: catalogue name.
-        update: formula (prior, z, components, **settings) -> Posterior.
+        formula: what has the settings as keyword-only arguments: an update formula (prior, z,
+            components, **settings) -> Posterior, or a class of `Method` where `predict` is None.
         summary: one line for lists.
         paper: key in papers.bib.
-        settings: keyword arguments of the formula that differ from its defaults.
+        predict: the prediction that goes with an update formula.
+        settings: those that differ from the defaults.
     """
 
     name: str
-    update: Update
+    formula: Update | Callable[..., Method]
     summary: str
     paper: str
+    predict: Predict | None = kalman.predict
     settings: tuple[tuple[str, Any], ...] = ()
 
     def with_settings(self, **settings: Any) -> "Filter":
         """The same filter with settings changed; unknown ones raise UsageError."""
-        parameters = signature(self.update).parameters.values()
+        parameters = signature(self.formula).parameters.values()
         known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.name != "correct"]
         for name in settings:
             if name not in known:
@@ -41,6 +47,13 @@ class Filter:
         hashable = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
         return replace(self, settings=tuple(sorted((dict(self.settings) | hashable).items())))
 
+    @property
+    def method(self) -> Method:
+        """What predicts, updates and tells."""
+        if self.predict is None:
+            return self.formula(**dict(self.settings))  # type: ignore[return-value]
+        return Updating(formula=self.formula, settings=self.settings, moved=self.predict)  # type: ignore[arg-type]
+
     def recursion(self, motion: Motion, sensor: Sensor) -> Recursion:
         """Predict and update with this filter, ready to run over lanes."""
-        return Recursion(self.update, self.settings, motion, sensor)
+        return Recursion(self.method, motion, sensor)

@@ -1,11 +1,10 @@
 """Predict and update, recorded once for a filter, a motion and a sensor, run over all lanes.
 
-The update formula is any function (prior, z, components) -> Posterior. Numbers of the motion and
-the sensor are inputs of the kernel, so noises and poses may be fixed, per lane, per step or both,
-and one kernel serves all their values.
+The filter is any `steps.Method`. Numbers of the motion and the sensor are inputs of the kernel, so
+noises and poses may be fixed, per lane, per step or both, and one kernel serves all their values.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol
@@ -13,8 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from boresight.errors import Status, UsageError
-from boresight.filters.kalman import predict
-from boresight.filters.posterior import Posterior
+from boresight.filters.steps import Method
 from boresight.lanes import (
     Kernel,
     Leaf,
@@ -28,6 +26,7 @@ from boresight.lanes import (
     pack_states,
     trace,
 )
+from boresight.lanes.program import Slot
 from boresight.maths import Gaussian, elimination, select
 from boresight.models.components import Component
 from boresight.models.motion import Motion
@@ -35,7 +34,6 @@ from boresight.models.parameters import numbers, rate_of, structure, with_number
 from boresight.models.sensors import Sensor
 
 Array = Any
-Update = Callable[..., Posterior]
 OUTPUTS = ("mean", "cov", "nis", "dof", "loglik", "innovation", "variance", "status", "inside")
 SUMMARY = ("nis", "dof", "loglik", "status")  # what a stream keeps of every step
 
@@ -53,6 +51,7 @@ def leaves(n: int, k: int) -> dict[str, Leaf]:
         "status": Scalar(),
         "inside": Scalar(),
         "summary": Vector(len(SUMMARY)),
+        "told": Vector(len(SUMMARY) + n + n * (n + 1) // 2),
     }
 
 
@@ -82,14 +81,12 @@ class Recursion:
     """A filter step with its models' structure: what a kernel is made from.
 
     Attributes:
-        update: the filter's formula.
-        settings: its keyword arguments.
+        method: the filter.
         motion, sensor: the models; their numbers are not part of the recursion's identity.
         guard: turns away plots that cannot be the target's, before the update sees them.
     """
 
-    update: Update
-    settings: tuple[tuple[str, Any], ...]
+    method: Method
     motion: Motion
     sensor: Sensor
     guard: "Guard | None" = None
@@ -99,41 +96,79 @@ class Recursion:
         """Number of states and of components."""
         return len(self.motion.names), len(self.sensor.names)
 
+    @property
+    def layout(self) -> dict[str, Leaf]:
+        """What travels from step to step."""
+        return self.method.layout(self.motion, self.sensor)
+
     def models(self) -> dict[str, tuple[Any, Leaf]]:
         """Numbers of both models."""
         found = numbers(self.motion, "motion") | numbers(self.sensor, "sensor")
         return found | numbers(self.guard, "guard") if self.guard else found
 
+    def with_inputs(self, values: Mapping[str, Any]) -> tuple[Motion, Sensor]:
+        """Both models with their numbers replaced."""
+        given = dict(values)
+        motion = with_numbers(self.motion, "motion", given)
+        return motion, with_numbers(self.sensor, "sensor", given)
+
+    def begin(self, mean: Array, cov: Array) -> Mapping[str, Any]:
+        """What the method keeps of one target that starts at a Gaussian (n,), (n, n)."""
+        return self.method.begin(Gaussian(mean, cov), self.motion, self.sensor)
+
     def step(self, state: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[Any, Any]:
         """One prediction and update of one target; the formula that is recorded."""
-        values = dict(inputs)
-        motion = with_numbers(self.motion, "motion", values)
-        sensor = with_numbers(self.sensor, "sensor", values)
-        prior = predict(Gaussian(state["mean"], state["cov"]), motion, inputs["dt"])
-        components, z, inside = sensor.components(motion), inputs["z"], 1.0
+        motion, sensor = self.with_inputs(inputs)
+        prior = self.method.predict(state, motion, sensor, inputs["dt"])
+        z, inside = inputs["z"], 1.0
         if self.guard:
-            z, inside = with_numbers(self.guard, "guard", values).admit(prior, z, components)
-        post = self.update(prior, z, components, **dict(self.settings))
-        results = post._asdict() | {
-            "status": status_of(post.mean, post.cov),
-            "inside": inside,
-        }
+            known = self.method.output(prior, motion, sensor)
+            guard = with_numbers(self.guard, "guard", dict(inputs))
+            z, inside = guard.admit(known, z, sensor.components(motion))
+        post, surprise = self.method.update(prior, z, motion, sensor)
+        told = self.method.output(post, motion, sensor)
+        results = surprise._asdict() | {"mean": told.mean, "cov": told.cov, "inside": inside}
+        results["status"] = status_of(told.mean, told.cov)
         results["summary"] = np.array([results[name] for name in SUMMARY])
-        return {"mean": post.mean, "cov": post.cov}, results
+        upper = told.cov[np.triu_indices(len(told.mean))]
+        results["told"] = np.concatenate([results["summary"], told.mean, upper])
+        return post, results
 
     def kernel(self, rates: Mapping[str, Rate], outputs: Mapping[str, Rate]) -> Kernel:
         """The compiled step, kept for the next call with the same structure and rates."""
-        models = [m for m in (self.motion, self.sensor, self.guard) if m is not None]
-        identity = (self.update, self.settings, *map(structure, models))
         wanted, given = tuple(sorted(outputs.items())), tuple(sorted(rates.items()))
-        return _kernel(_Key(self, identity), given, wanted)
+        return _kernel(_Key(self), given, wanted)
+
+    def states(self, start: Gaussian, lanes: int) -> States:
+        """Blocked states from mean (n,) or (lanes, n) and cov (n, n) or (lanes, n, n)."""
+        mean, cov = _spread(start, lanes)
+        slots = tuple(Slot(name, leaf) for name, leaf in self.layout.items())
+        if self.method.plain:
+            return pack_states(slots, {"mean": mean, "cov": cov})
+        rated = {name: rate_of(name, *pair) for name, pair in self.models().items()}
+        rates = tuple(sorted((name, rate) for name, (rate, _) in rated.items()))
+        given = {name: _first_step(*pair) for name, pair in rated.items()}
+        empty = {slot.name: np.zeros((lanes, *slot.leaf.shape)) for slot in slots}
+        begun, _ = _begin_kernel(_Key(self), rates).run(
+            pack_states(slots, empty), given | {"mean": mean, "cov": cov}, 1
+        )
+        return begun
+
+
+def _first_step(rate: Rate, value: Array) -> Array:
+    """What a number is at the first step, in the shape of its rate."""
+    if rate is Rate.STEP:
+        return value[:1]
+    return value[:, :1] if rate is Rate.EACH else value
 
 
 class _Key:
     """Compares recursions by what their formula depends on."""
 
-    def __init__(self, recursion: Recursion, identity: tuple[Any, ...]) -> None:
-        self.recursion, self.identity = recursion, identity
+    def __init__(self, recursion: Recursion) -> None:
+        models = (recursion.motion, recursion.sensor, recursion.guard)
+        self.recursion = recursion
+        self.identity = (recursion.method, *(structure(m) for m in models if m is not None))
 
     def __hash__(self) -> int:
         return hash(self.identity)
@@ -153,16 +188,45 @@ def _kernel(
     return make_kernel(
         trace(
             recursion.step,
-            state={"mean": Vector(n), "cov": Symmetric(n)},
+            state=recursion.layout,
             inputs={name: (shape, rate[name]) for name, shape in shapes.items()},
             outputs={name: (_full(leaves(n, k)[name]), when) for name, when in outputs},
         )
     )
 
 
+@lru_cache(maxsize=128)
+def _begin_kernel(key: _Key, rates: tuple[tuple[str, Rate], ...]) -> Kernel:
+    """From a Gaussian to what the method keeps, over lanes."""
+    recursion, rate = key.recursion, dict(rates)
+    n, _ = recursion.size
+
+    def step(_: Any, inputs: Mapping[str, Any]) -> tuple[Any, Any]:
+        models = recursion.with_inputs(inputs)
+        start = Gaussian(inputs["mean"], inputs["cov"])
+        return recursion.method.begin(start, *models), {}
+
+    shapes = {name: (leaf, rate[name]) for name, (_, leaf) in recursion.models().items()}
+    shapes |= {"mean": (Vector(n), Rate.LANE), "cov": (Symmetric(n), Rate.LANE)}
+    return make_kernel(trace(step, state=recursion.layout, inputs=shapes, outputs={}))
+
+
 def _full(leaf: Leaf) -> Leaf:
     """Covariances leave as full matrices: a caller's NumPy needs no unpacking."""
     return Matrix(*leaf.shape) if leaf.symmetric else leaf
+
+
+def _spread(start: Gaussian, lanes: int) -> tuple[Array, Array]:
+    """Mean (lanes, n) and cov (lanes, n, n) of a Gaussian whose leading axis may be absent."""
+    n = np.shape(start.mean)[-1]
+    leading = {*np.shape(start.mean)[:-1], *np.shape(start.cov)[:-2]}
+    if np.shape(start.cov)[-2:] != (n, n) or leading - {1, lanes}:
+        raise UsageError(
+            f"a start with mean {np.shape(start.mean)} and cov {np.shape(start.cov)}",
+            why=f"it must be ({lanes}, n) and ({lanes}, n, n), or (n,) and (n, n)",
+        )
+    mean = np.broadcast_to(np.asarray(start.mean, dtype=float), (lanes, n))
+    return mean, np.broadcast_to(np.asarray(start.cov, dtype=float), (lanes, n, n))
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,27 +250,6 @@ class Estimate:
             return self.__dict__["others"][name]
         except KeyError:
             raise AttributeError(name) from None
-
-
-def start_states(start: Gaussian, lanes: int) -> States:
-    """Blocked states from a Gaussian whose leading axis is absent or (lanes,)."""
-    n = np.shape(start.mean)[-1]
-    leading = {*np.shape(start.mean)[:-1], *np.shape(start.cov)[:-2]}
-    if np.shape(start.cov)[-2:] != (n, n) or leading - {1, lanes}:
-        raise UsageError(
-            f"a start with mean {np.shape(start.mean)} and cov {np.shape(start.cov)}",
-            why=f"it must be ({lanes}, n) and ({lanes}, n, n), or (n,) and (n, n)",
-        )
-    slots = _state_slots(n)
-    mean = np.broadcast_to(np.asarray(start.mean, dtype=float), (lanes, n))
-    cov = np.broadcast_to(np.asarray(start.cov, dtype=float), (lanes, n, n))
-    return pack_states(slots, {"mean": mean, "cov": cov})
-
-
-def _state_slots(n: int) -> tuple[Any, ...]:
-    from boresight.lanes.program import Slot
-
-    return (Slot("mean", Vector(n)), Slot("cov", Symmetric(n)))
 
 
 def run_recursion(
@@ -245,7 +288,7 @@ def run_recursion(
     rates = {name: rate for name, (rate, _) in rated.items()} | {"z": Rate.EACH}
     when = Rate.LANE if last else Rate.EACH
     kernel = recursion.kernel(rates, dict.fromkeys(outputs, when))
-    states = start if isinstance(start, States) else start_states(start, z.shape[0])
+    states = start if isinstance(start, States) else recursion.states(start, z.shape[0])
     values = {name: value for name, (_, value) in rated.items()} | {"z": z}
     final, results = kernel.run(states, values, z.shape[1], threads=threads)
     return Estimate(results, final)

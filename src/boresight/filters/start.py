@@ -10,8 +10,9 @@ import numpy as np
 
 from boresight.errors import UsageError
 from boresight.maths import Gaussian
+from boresight.models.coordinates import CartesianPlots, PositionSensor
 from boresight.models.motion import Motion
-from boresight.models.sensors import PositionSensor, Radar, Sensor
+from boresight.models.sensors import Radar, Sensor
 
 Array = Any
 SPEED_MPS = 300.0  # spread of an unknown velocity, each axis: covers airliners
@@ -97,6 +98,8 @@ def locate(z: Array, motion: Motion, sensor: Sensor) -> tuple[Array, Array]:
         sigmas = [np.broadcast_to(_first(getattr(sensor, n)), len(z)) for n in sensor.names]
         variances = np.stack(sigmas, axis=-1)[:, : motion.dims] ** 2
         return z[:, : motion.dims], variances[:, :, None] * np.eye(motion.dims)
+    if isinstance(sensor, CartesianPlots):
+        return z, _first_cov(sensor.cov, len(z))
     if not isinstance(sensor, Radar):
         raise UsageError(f"no start from one plot of a {type(sensor).__name__}", next_step=_GIVE)
     needed = ("range_m", "azimuth_rad", "elevation_rad")[: motion.dims]
@@ -126,6 +129,12 @@ def _first(sigma: Any) -> Any:
     """A noise at the first step: a number, or one a lane."""
     array = np.asarray(sigma, dtype=float)
     return array[:, 0] if array.ndim == 2 else array
+
+
+def _first_cov(cov: Array, lanes: int) -> Array:
+    """Covariances (lanes, d, d) at the first step, of (d, d) or (lanes, steps, d, d)."""
+    array = cov[:, 0] if cov.ndim == 4 else cov
+    return np.broadcast_to(array, (lanes, *array.shape[-2:]))
 
 
 def from_polar(polar: Array) -> tuple[Array, Array]:

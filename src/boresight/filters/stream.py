@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import Status, UsageError
-from boresight.filters.recursion import SUMMARY, Recursion, start_states
-from boresight.filters.start import SPEED_MPS, one_plot
-from boresight.lanes import BLOCK, Kernel, Rate, States
+from boresight.filters.recursion import SUMMARY, Recursion
+from boresight.filters.start import SPEED_MPS
+from boresight.lanes import BLOCK, Kernel, Rate, States, Symmetric
 from boresight.maths import Gaussian
 from boresight.models.parameters import rate_of
 
@@ -85,7 +85,9 @@ class Stream:
                 raise UsageError(f"{name} changes from step to step; a stream needs one value")
         rates = {name: rate for name, (rate, _) in rated.items()}
         rates |= {"z": Rate.EACH, "dt": Rate.FIXED}
-        self._kernel: Kernel = recursion.kernel(rates, {"summary": Rate.LANE})
+        # A method that keeps something else than it tells has the telling written beside it.
+        self._written = "summary" if recursion.method.plain else "told"
+        self._kernel: Kernel = recursion.kernel(rates, {self._written: Rate.LANE})
         self._values = {name: value for name, (_, value) in rated.items()}
         self._bind()
 
@@ -93,7 +95,8 @@ class Stream:
         """Fix addresses and sizes once: looking them up costs more than the filter does."""
         program, code = self._kernel.program, self._kernel.code
         self._state_numbers = -(-self._lanes // BLOCK) * program.state_size * BLOCK
-        self._clock = self._state_numbers + len(SUMMARY) * self._lanes
+        self._width = program.outputs[0].leaf.size
+        self._clock = self._state_numbers + self._width * self._lanes
         count = self._components * self._lanes
         self._buffer_type: Any = ctypes.c_double * (self._clock + 1 + count)
         self._pack = struct.Struct(f"{1 + count}d").pack_into
@@ -112,20 +115,31 @@ class Stream:
 
     def start(self, plot: Array | Gaussian, *, speed_mps: float = SPEED_MPS) -> StreamState:
         """Begin from a plot (k,) or (targets, k), or from a Gaussian."""
-        prior = plot
+        recursion, prior = self.recursion, plot
         if not isinstance(plot, Gaussian):
-            prior = one_plot(
-                plot, self.recursion.motion, self.recursion.sensor, speed_mps=speed_mps
-            )
-        states = start_states(prior, self._lanes)
-        if states.data.size != self._state_numbers:
+            rows = np.reshape(plot, (-1, self._components))
+            models = recursion.motion, recursion.sensor
+            prior = recursion.method.start(rows, *models, speed_mps=speed_mps)
+        n = len(recursion.motion.names)
+        if np.shape(prior.mean)[-1:] != (n,):
             raise UsageError(
                 f"a start with mean {np.shape(prior.mean)}",
-                why=f"the motion has the states {', '.join(self.recursion.motion.names)}",
+                why=f"the motion has the states {', '.join(recursion.motion.names)}",
             )
+        states = recursion.states(prior, self._lanes)
         buffer = self._buffer_type()
         np.frombuffer(buffer)[: self._state_numbers] = states.data.ravel()
+        self._tell(buffer, prior)
         return StreamState(self, buffer)
+
+    def _tell(self, buffer: Any, prior: Gaussian) -> None:
+        """Before its first plot a target is where its start says."""
+        if self._written == "summary":
+            return
+        n = len(self.recursion.motion.names)
+        told = self._rows(buffer)
+        told[:, len(SUMMARY) : len(SUMMARY) + n] = prior.mean
+        told[:, len(SUMMARY) + n :] = Symmetric(n).pack(prior.cov)
 
     def __call__(self, state: StreamState, plot: Array, dt: float) -> StreamState:
         """The state after dt seconds and a plot.
@@ -175,7 +189,7 @@ class Stream:
         values = self._values | {"z": z, "dt": numbers[self._clock]}
         final, outputs = self._kernel.run(self._states(old), values, 1)
         numbers[: self._state_numbers] = final.data.ravel()
-        numbers[self._state_numbers : self._clock] = outputs["summary"].ravel()
+        numbers[self._state_numbers : self._clock] = outputs[self._written].ravel()
 
     def _wrong(self, plot: Any) -> UsageError:
         shape = (self._components,) if self.targets is None else (self._lanes, self._components)
@@ -189,13 +203,23 @@ class Stream:
         data = np.frombuffer(buffer)[: self._state_numbers]
         return States(program.state, data.reshape(-1, program.state_size, 8), self._lanes)
 
+    def _rows(self, buffer: Any) -> Array:
+        """What was written after the last step, (targets, width)."""
+        numbers = np.frombuffer(buffer)[self._state_numbers : self._clock]
+        return numbers.reshape(self._lanes, self._width)
+
     def leaf(self, buffer: Any, name: str) -> Array:
-        """A leaf of the state as a plain array."""
-        value = self._states(buffer)[name]
+        """`mean` or `cov` as a plain array."""
+        n, first = len(self.recursion.motion.names), len(SUMMARY)
+        if self._written == "summary":
+            value = self._states(buffer)[name]
+        elif name == "mean":
+            value = self._rows(buffer)[:, first : first + n].copy()
+        else:
+            value = Symmetric(n).unpack(self._rows(buffer)[:, first + n :])
         return value[0] if self.targets is None else value
 
     def output(self, buffer: Any, name: str) -> Any:
         """An output of the last step: a number, or (targets,)."""
-        rows = np.frombuffer(buffer)[self._state_numbers : self._clock]
-        column = rows.reshape(self._lanes, len(SUMMARY))[:, SUMMARY.index(name)]
+        column = self._rows(buffer)[:, SUMMARY.index(name)]
         return float(column[0]) if self.targets is None else column.copy()

@@ -9,9 +9,10 @@ import numpy as np
 
 from boresight import catalogue
 from boresight.errors import UsageError
-from boresight.filters.recursion import Estimate, run_recursion
-from boresight.filters.start import one_plot, two_plots
+from boresight.filters.recursion import Estimate, Recursion, run_recursion
+from boresight.filters.start import SPEED_MPS, two_plots
 from boresight.filters.stream import Stream
+from boresight.interfaces import door
 from boresight.maths import Gaussian
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
@@ -36,6 +37,7 @@ def run(
     *,
     dt: Array | None = None,
     start: Gaussian | Literal["one plot", "two plots"] | None = None,
+    speed_mps: float = SPEED_MPS,
     outputs: Sequence[str] = ("mean", "cov", "nis"),
     last: bool = False,
     threads: int = 1,
@@ -54,6 +56,7 @@ def run(
         start: Gaussian with mean (n,) or (runs, n); or "one plot" or "two plots": made from the
             first plots, which are then used for the start only (until then every scan shows the
             start). Left out: what `plots` carries, else "one plot".
+        speed_mps: spread of each velocity of a start from one plot.
         outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status.
         last: give outputs after the last scan only.
         threads: threads that share the runs; the result does not depend on it.
@@ -74,12 +77,12 @@ def run(
     recursion = catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor)
     prior = getattr(plots, "prior", None) if start is None else start
     if not isinstance(prior, Gaussian):
-        prior, z, steps = _start_from_plots(prior or "one plot", z, steps, motion, sensor)
+        prior, z, steps = _start_from_plots(prior or "one plot", z, steps, recursion, speed_mps)
     return run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
 
 
 def _start_from_plots(
-    how: str, z: Array, dt: Array, motion: Motion, sensor: Sensor
+    how: str, z: Array, dt: Array, recursion: Recursion, speed_mps: float
 ) -> tuple[Gaussian, Array, Array]:
     """A start from the first plots, which are then not used again."""
     used = _STARTS.get(how, 0)
@@ -89,10 +92,11 @@ def _start_from_plots(
         )
     rows = np.shape(dt)[0] if np.ndim(dt) else 1
     steps = np.array(np.broadcast_to(np.asarray(dt, dtype=float), (rows, z.shape[1])))
+    models = recursion.motion, recursion.sensor
     if used == 1:
-        prior = one_plot(z[:, 0], motion, sensor)
+        prior = recursion.method.start(z[:, 0], *models, speed_mps=speed_mps)
     else:
-        prior = two_plots(z[:, 0], z[:, 1], steps[:, 1], motion, sensor)
+        prior = two_plots(z[:, 0], z[:, 1], steps[:, 1], *models)
     rest = z.copy()
     rest[:, :used], steps[:, :used] = np.nan, 0.0
     return prior, rest, steps
@@ -146,7 +150,8 @@ def track(
     *,
     site: Site | tuple[float, float, float] | None = None,
     sensor: str | None = None,
-    filter: str = "mekf",  # noqa: A002 - the field's word
+    filter: str = door.FILTER,  # noqa: A002 - the field's word
+    compare: Sequence[str] | Literal["all"] = (),
     atmosphere: Atmosphere | None = None,
 ) -> "TrackingResult":
     """Tracks of every identified target of one radar.
@@ -156,6 +161,8 @@ def track(
         site: of the radar: latitude and longitude in degrees, height above the ellipsoid in m.
         sensor: "SAC/SIC", if the plots are of several.
         filter: of the catalogue.
+        compare: further filters to run on the same plots with the same noise, or "all" that can
+            take them; the result's `filters` and `scores`, and the report, set them side by side.
         atmosphere: the air whose delay is taken out of the ranges, such as
             `ExponentialAtmosphere()`; None for none.
     """
@@ -165,8 +172,18 @@ def track(
     if place is not None and not isinstance(place, Site):
         latitude, longitude, height = place
         place = Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
-    chosen = catalogue.lookup(filter)
-    return track_plots(plots, site=place, sensor=sensor, filter=chosen, atmosphere=atmosphere)
+    (first, *others), is_all = door.filters(
+        [filter, *([compare] if isinstance(compare, str) else compare)]
+    )
+    return track_plots(
+        plots,
+        site=place,
+        sensor=sensor,
+        filter=first,
+        compare=others,
+        leave_out=is_all,
+        atmosphere=atmosphere,
+    )
 
 
 def report(tracks: "TrackingResult", **about: Any) -> "Report":

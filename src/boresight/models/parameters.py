@@ -28,8 +28,15 @@ def numbers(model: Any, prefix: str) -> dict[str, tuple[Any, Leaf]]:
         if is_dataclass(value):
             found |= numbers(value, name)
         elif _is_number(value):
-            found[name] = (value, Leaf(tuple(field.metadata.get("shape", ()))))
+            found[name] = (value, Leaf(_shape(field, value)))
     return found
+
+
+def _shape(field: Any, value: Any) -> tuple[int, ...]:
+    """What one target needs: as declared, or the last so many axes of what was given."""
+    if "trailing" in field.metadata:
+        return tuple(np.shape(value)[-field.metadata["trailing"] :])
+    return tuple(field.metadata.get("shape", ()))
 
 
 def with_numbers(model: Model, prefix: str, values: dict[str, Any]) -> Model:
@@ -51,7 +58,7 @@ def structure(model: Any) -> tuple[Any, ...]:
         if is_dataclass(value):
             value = structure(value)
         elif _is_number(value):
-            value = "number"
+            value = ("number", _shape(field, value))
         parts.append((field.name, value))
     return tuple(parts)
 

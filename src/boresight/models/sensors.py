@@ -7,12 +7,12 @@ A plot is an array (k,), SI units and radians, NaN where a component was not mea
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.maths import missing, select
 from boresight.maths.frames import Site, ellipsoid_height
 from boresight.models.atmosphere import EARTH_M, Atmosphere
 from boresight.models.components import FORMULAS, Component
@@ -58,6 +58,12 @@ class Sensor(Protocol):
     def components(self, motion: Motion) -> tuple[Component, ...]:
         """The formulas of what is measured, for states of `motion`."""
 
+    def independent(self, z: Array, motion: Motion) -> tuple[Array, tuple[Component, ...]]:
+        """The plot and its components turned so that their noises are independent."""
+
+    def coloured(self, normals: Array) -> Array:
+        """Independent standard normals (k,) made as correlated as the sensor's noises are."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Radar:
@@ -71,6 +77,8 @@ class Radar:
         pressure_altitude_m: what a transponder reports, m; needs `site`. It differs from the
             height by an offset that weather makes; a motion `WithHeightOffset` carries that.
         range_rate_mps: range rate, m/s, positive when opening.
+        range_rate_correlation: of the noises of range and range rate (a linear chirp couples
+            them), between -1 and 1; None where they are independent.
         pose: None for a fixed radar at the origin of the track frame, along its axes.
         site: place of the track frame's origin; needed for heights and for the atmosphere. The
             frame is then x = North, y = East, z = up.
@@ -84,6 +92,7 @@ class Radar:
     height_m: Any = None
     pressure_altitude_m: Any = None
     range_rate_mps: Any = None
+    range_rate_correlation: Any = None
     pose: Pose | None = None
     site: Site | None = None
     atmosphere: Atmosphere | None = None
@@ -93,7 +102,9 @@ class Radar:
         for name in _SIGMAS:
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, _sigma(name, value))
+                object.__setattr__(self, name, standard_deviation(name, value))
+        if self.range_rate_correlation is not None:
+            _check_correlation(self)
         told = (self.height_m, self.pressure_altitude_m, self.atmosphere)
         if self.site is None and any(each is not None for each in told):
             raise UsageError(
@@ -130,6 +141,36 @@ class Radar:
             return formula(*self.relative(state, motion.dims))
 
         return Component(name, value, sigma)
+
+    def independent(self, z: Array, motion: Motion) -> tuple[Array, tuple[Component, ...]]:
+        """The plot and its components; a range rate without what its noise shares with the range's.
+
+        Where the range is missing there is nothing to take off.
+        """
+        parts = self.components(motion)
+        if self.range_rate_correlation is None:
+            return z, parts
+        i, j = (self.names.index(name) for name in ("range_m", "range_rate_mps"))
+        gone, (distance, rate) = missing(z[i]), (parts[i], parts[j])
+        rho = select(gone, 0.0, 1.0) * self.range_rate_correlation
+        slope = rho * rate.sigma / distance.sigma
+
+        def value(state: Array) -> Any:
+            return rate.value(state) - slope * distance.value(state)
+
+        rest = Component(rate.name, value, rate.sigma * np.sqrt(1.0 - rho * rho))
+        turned = [*z]
+        turned[j] = z[j] - slope * select(gone, 0.0, z[i])
+        return np.array(turned), (*parts[:j], rest, *parts[j + 1 :])
+
+    def coloured(self, normals: Array) -> Array:
+        """Independent standard normals (k,) with the correlation of range and range rate."""
+        if self.range_rate_correlation is None:
+            return normals
+        i, j = (self.names.index(name) for name in ("range_m", "range_rate_mps"))
+        rho, mixed = self.range_rate_correlation, [*normals]
+        mixed[j] = rho * normals[i] + np.sqrt(1.0 - rho * rho) * normals[j]
+        return np.array(mixed)
 
     def relative(self, state: Array, dims: int) -> tuple[Array, Array]:
         """Position and velocity (dims,) relative to the sensor, in the sensor's frame."""
@@ -185,11 +226,21 @@ class Radar:
         return value
 
 
-def _coordinate(i: int, state: Array) -> Any:
-    return state[i]
+def _check_correlation(radar: Radar) -> None:
+    """It becomes a float or an array, and needs both of what it correlates."""
+    rho = np.asarray(radar.range_rate_correlation, dtype=float)
+    if radar.range_m is None or radar.range_rate_mps is None:
+        raise UsageError("a correlation of range and range rate needs a radar that measures both")
+    if not np.all(np.abs(rho) < 1.0):
+        raise UsageError(
+            f"range_rate_correlation={radar.range_rate_correlation!r} is not a correlation",
+            why="it must lie between -1 and 1",
+        )
+    object.__setattr__(radar, "range_rate_correlation", rho if rho.ndim else float(rho))
 
 
-def _sigma(name: str, value: Any) -> Any:
+def standard_deviation(name: str, value: Any) -> Any:
+    """The value as a float or an array; UsageError where it is not positive."""
     sigma = float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
     if not np.all(np.asarray(sigma) > 0):
         raise UsageError(
@@ -198,38 +249,6 @@ def _sigma(name: str, value: Any) -> Any:
             next_step=f"leave {name} out if the sensor does not measure it",
         )
     return sigma
-
-
-@dataclass(frozen=True, kw_only=True)
-class PositionSensor:
-    """A sensor that measures coordinates of the track frame: multilateration, GPS.
-
-    Attributes:
-        x_m, y_m, z_m: standard deviations, m; z_m is None for a planar sensor.
-    """
-
-    x_m: Any
-    y_m: Any
-    z_m: Any = None
-
-    def __post_init__(self) -> None:
-        """Numbers become floats or arrays, and are checked."""
-        for name in self.names:
-            object.__setattr__(self, name, _sigma(name, getattr(self, name)))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The coordinates that are measured."""
-        return ("x_m", "y_m") if self.z_m is None else ("x_m", "y_m", "z_m")
-
-    def components(self, motion: Motion) -> tuple[Component, ...]:
-        """Each coordinate of the state's position."""
-        if motion.dims < len(self.names):
-            raise UsageError(f"a sensor of {self.names} cannot see a motion in {motion.dims} dims")
-        return tuple(
-            Component(name, partial(_coordinate, i), getattr(self, name))
-            for i, name in enumerate(self.names)
-        )
 
 
 def Bearings(*, azimuth_deg: Any, pose: Pose | None = None) -> Radar:
