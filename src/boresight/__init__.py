@@ -29,6 +29,7 @@ _WHERE = {
         "WithHeightOffset",
     ],
     "models.coordinates": ["CartesianPlots", "PositionSensor"],
+    "models.polar": ["Given"],
     "models.sensors": ["Bearings", "Pose", "Radar"],
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
     "catalogue": ["cite"],
@@ -36,7 +37,8 @@ _WHERE = {
     "experiments.simulate": ["simulate"],
     "experiments.metrics": ["anees", "rmse"],
     "experiments.reproduce": ["reproduce"],
-    "interfaces.python": ["inspect", "read", "report", "run", "stream", "track"],
+    "interfaces.converting": ["convert"],
+    "interfaces.python": ["inspect", "read", "report", "run", "smooth", "stream", "track"],
 }
 _NAMES = {name: module for module, names in _WHERE.items() for name in names}
 __all__ = sorted([*_NAMES, "__version__"])  # noqa: PLE0605 - built from the one table above

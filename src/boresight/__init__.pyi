@@ -9,10 +9,12 @@ from boresight.experiments.metrics import rmse as rmse
 from boresight.experiments.reproduce import reproduce as reproduce
 from boresight.experiments.scenario import Scenario as Scenario
 from boresight.experiments.simulate import simulate as simulate
+from boresight.interfaces.converting import convert as convert
 from boresight.interfaces.python import inspect as inspect
 from boresight.interfaces.python import read as read
 from boresight.interfaces.python import report as report
 from boresight.interfaces.python import run as run
+from boresight.interfaces.python import smooth as smooth
 from boresight.interfaces.python import stream as stream
 from boresight.interfaces.python import track as track
 from boresight.maths.frames import Site as Site
@@ -28,6 +30,7 @@ from boresight.models.motion import CoordinatedTurn as CoordinatedTurn
 from boresight.models.motion import SphericalUnitRate as SphericalUnitRate
 from boresight.models.motion import Static as Static
 from boresight.models.motion import WithHeightOffset as WithHeightOffset
+from boresight.models.polar import Given as Given
 from boresight.models.sensors import Bearings as Bearings
 from boresight.models.sensors import Pose as Pose
 from boresight.models.sensors import Radar as Radar

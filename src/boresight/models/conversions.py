@@ -24,8 +24,9 @@ truth. What is conditioned on the plot does not look at `given`; mmse without on
 for the truth.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from difflib import get_close_matches
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -86,6 +87,7 @@ class Plot(NamedTuple):
     loss: tuple[Any, Any]
 
 
+Found = TypeVar("Found")
 Conversion = Callable[[Plot, Given | None], Gaussian]
 
 
@@ -133,7 +135,7 @@ def _sum(a: Sheet, b: Sheet) -> Sheet:
     return Sheet(*[x + y for x, y in zip(a, b, strict=True)])
 
 
-def _stretched(point: Array, ground: Any, up: Any) -> Array:
+def stretched(point: Array, ground: Any, up: Any) -> Array:
     return np.array([x * f for x, f in zip(point, (ground, ground, up), strict=False)])
 
 
@@ -168,9 +170,10 @@ def _debiased(plot: Plot, given: Given | None) -> Gaussian:
             next_step="give a place (a prediction may stand in), or use cmkf-d-m",
         )
     where = place(given)
-    bias = _stretched(mean_point(where, len(plot.z)), *plot.loss)
+    bias = stretched(mean_point(where, len(plot.z)), *plot.loss)
+    mean = np.array([u + b for u, b in zip(plot.point, bias, strict=True)])
     spread = _scaled(true_spread(plot, where), *plot.shrink)
-    return Gaussian(plot.point + bias, cartesian(spread, where, len(plot.z)))
+    return Gaussian(mean, cartesian(spread, where, len(plot.z)))
 
 
 def _debiased_by_plot(plot: Plot, given: Given | None) -> Gaussian:
@@ -187,21 +190,28 @@ def _posterior(plot: Plot) -> Sheet:
 def _modified_unbiased(plot: Plot, given: Given | None) -> Gaussian:
     """Bordonaro (14) to (18)."""
     del given
-    mean = _stretched(plot.point, *plot.shrink)
+    mean = stretched(plot.point, *plot.shrink)
     return Gaussian(mean, cartesian(_posterior(plot), plot.at, len(plot.z)))
 
 
 def _unstretched(plot: Plot) -> Array:
     """The unbiased point u / D: bordonaro (6), (7), (24), (25)."""
     ground, up = plot.shrink
-    return _stretched(plot.point, 1.0 / ground, 1.0 / up)
+    return stretched(plot.point, 1.0 / ground, 1.0 / up)
+
+
+def bias_given_plot(plot: Plot) -> tuple[Any, Any]:
+    """What 1 / D - D stretches ground and height by: the unbiased point less the average target."""
+    ground, up = (
+        loss * (1.0 + kept) / kept for loss, kept in zip(plot.loss, plot.shrink, strict=True)
+    )
+    return ground, up
 
 
 def _unbiased(plot: Plot, given: Given | None) -> Gaussian:
     """Bordonaro (6), (7) and (11) to (13)."""
     del given
-    bias = [loss * (1.0 + kept) / kept for loss, kept in zip(plot.loss, plot.shrink, strict=True)]
-    squared = _scaled(_second_moment(plot.at), *bias)
+    squared = _scaled(_second_moment(plot.at), *bias_given_plot(plot))
     cov = cartesian(_sum(_posterior(plot), squared), plot.at, len(plot.z))
     return Gaussian(_unstretched(plot), cov)
 
@@ -216,7 +226,7 @@ def _least_square(plot: Plot, given: Given | None) -> Gaussian:
     short = [lost + kept * rest for lost, kept in zip(plot.loss, plot.shrink, strict=True)]
     noise = _scaled(true_spread(plot, where), *[eta * kept for kept in plot.shrink])
     error = _sum(noise, _scaled(_second_moment(where), *short))
-    return Gaussian(_stretched(plot.point, eta, eta), cartesian(error, where, len(plot.z)))
+    return Gaussian(stretched(plot.point, eta, eta), cartesian(error, where, len(plot.z)))
 
 
 def _decorrelated(plot: Plot, given: Given | None) -> Gaussian:
@@ -236,6 +246,17 @@ CONVERSIONS: dict[str, Conversion] = {
     "mmse": _least_square,
     "ducm": _decorrelated,
 }
+
+
+def lookup(name: str, known: Mapping[str, Found]) -> Found:
+    """What is known by that name; UsageError with the nearest valid name if nothing is."""
+    if name in known:
+        return known[name]
+    near = get_close_matches(name, known, n=1)
+    raise UsageError(
+        f"there is no conversion {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
+        next_step=f"use one of {', '.join(known)}",
+    )
 
 
 def understand(z: Array, sigma: Array) -> Plot:
@@ -266,8 +287,9 @@ def convert(name: str, z: Array, sigma: Array, given: Given | None = None) -> Ga
     Raises:
         UsageError: no such conversion, or one that must be given the truth is not.
     """
-    if name not in CONVERSIONS:
-        raise UsageError(
-            f"no conversion {name!r}", next_step=f"use one of {', '.join(CONVERSIONS)}"
-        )
-    return CONVERSIONS[name](understand(z, sigma), given)
+    return conditioned(name, understand(z, sigma), given)
+
+
+def conditioned(name: str, plot: Plot, given: Given | None) -> Gaussian:
+    """`convert`, of a plot that is understood already."""
+    return lookup(name, CONVERSIONS)(plot, given)

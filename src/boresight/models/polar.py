@@ -93,11 +93,15 @@ def place(given: Given) -> Place:
     return Place(distance, distance * distance + spread, *[*averages, LEVEL][:2])
 
 
+def mean_direction(where: Place, dims: int) -> Array:
+    """Average (d,) of the unit vector that points at the target."""
+    azimuth, (low, high) = where.azimuth, where.elevation[:2]
+    return np.array([low * azimuth.cos, low * azimuth.sin, high][:dims])
+
+
 def mean_point(where: Place, dims: int) -> Array:
     """Average Cartesian position (d,)."""
-    ground, azimuth = where.range * where.elevation.cos, where.azimuth
-    up = where.range * where.elevation.sin
-    return np.array([ground * azimuth.cos, ground * azimuth.sin, up][:dims])
+    return np.array([where.range * u for u in mean_direction(where, dims)])
 
 
 def angle_noise(variance: Any) -> Noise:
