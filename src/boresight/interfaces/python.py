@@ -1,6 +1,7 @@
 """The verbs a user types in Python: friendly over what is exact below."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,6 +11,7 @@ import numpy as np
 from boresight import catalogue
 from boresight.errors import UsageError
 from boresight.filters.recursion import Estimate, Recursion, run_recursion
+from boresight.filters.smoother import smooth as smooth_lanes
 from boresight.filters.start import SPEED_MPS, two_plots
 from boresight.filters.stream import Stream
 from boresight.interfaces import door
@@ -63,7 +65,8 @@ def run(
         settings: the filter's own, such as `mu="none"` for the MEKF.
 
     Returns:
-        The outputs as attributes: mean (runs, scans, n), cov (runs, scans, n, n), ...
+        The outputs as attributes: mean (runs, scans, n), cov (runs, scans, n, n), ...; and `dt`
+        as the filter took it, 0 up to the scan of a start from plots.
 
     Raises:
         UsageError: an unknown name or setting, or shapes that do not fit.
@@ -78,7 +81,46 @@ def run(
     prior = getattr(plots, "prior", None) if start is None else start
     if not isinstance(prior, Gaussian):
         prior, z, steps = _start_from_plots(prior or "one plot", z, steps, recursion, speed_mps)
-    return run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
+    found = run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
+    return replace(found, others=found.others | {"dt": steps})
+
+
+def smooth(
+    estimate: Estimate,
+    motion: Motion,
+    dt: Any = None,
+    *,
+    linearisation: Literal["jacobian", "cubature"] = "jacobian",
+    threads: int = 1,
+) -> Estimate:
+    """What all plots say of every scan, the later ones too (Rauch-Tung-Striebel).
+
+    Args:
+        estimate: of any filter, with mean and cov of every scan; NaN where there is none.
+        motion: the one that the filter was given.
+        dt: seconds before each scan as in `run`, or plots that carry it. Left out: that of the
+            estimate, if `run` made it.
+        linearisation: how a motion that is not linear is made so.
+        threads: threads that share the runs; the result does not depend on it.
+
+    Returns:
+        The estimate with mean (runs, scans, n) and cov (runs, scans, n, n) smoothed; nothing else.
+
+    Raises:
+        UsageError: the estimate lacks mean, cov or dt, or shapes do not fit.
+    """
+    given = estimate.others | ({} if dt is None else {"dt": getattr(dt, "dt", dt)})
+    lacking = [name for name in ("mean", "cov", "dt") if given.get(name) is None]
+    if lacking:
+        raise UsageError(
+            f"an estimate without {lacking[0]!r} cannot be smoothed",
+            next_step="pass dt= in seconds" if lacking[0] == "dt" else "run with it in outputs",
+        )
+    filtered = Gaussian(given["mean"], given["cov"])
+    smoothed = smooth_lanes(
+        filtered, given["dt"], motion, linearisation=linearisation, threads=threads
+    )
+    return replace(estimate, others=smoothed._asdict() | {"dt": given["dt"]})
 
 
 def _start_from_plots(
