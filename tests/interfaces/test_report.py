@@ -15,15 +15,16 @@ import worlds
 from scipy import stats
 
 from boresight.errors import OutputError
-from boresight.interfaces.report import consistency, report, residuals, verdict
+from boresight.interfaces.report import beside, consistency, report, residuals, verdict
 from boresight.interfaces.report.charts import short, typed
-from boresight.interfaces.report.words import clock, figure
+from boresight.interfaces.report.words import clock, figure, gain
 
 CHROMIUM = Path("/usr/bin/chromium")
 MEGABYTE = 1_000_000
 VOID = {"meta", "link", "br", "hr", "img", "input", "path", "rect", "circle"}
 SECTIONS = (
-    "verdict plan residuals consistency filters targets skipped recording settings provenance"
+    "verdict plan residuals consistency side-by-side filters targets skipped recording settings "
+    "provenance"
 )
 
 needs_chromium = pytest.mark.skipif(
@@ -148,6 +149,9 @@ def test_the_machine_readable_part_is_strict_json_and_says_the_same(html, result
     assert (found["plots"], found["used"]) == (result.plots, result.used)
     assert found["targets"][0]["track"] == result.targets["track"][0]
     assert found["comparisons"][1]["filter"] == "mekf"
+    assert [each["filter"] for each in found["filters"]] == ["ekf", "mekf", "iekf"]
+    assert found["filters"][0]["gain"]["mean"] is None
+    assert found["filters"][1]["gain"]["ci95"] == pytest.approx([0.01, 0.03])
     assert found["recording"]["sha256"] == "9f" * 32
 
 
@@ -273,6 +277,55 @@ def test_a_start_without_nis_does_not_spoil_the_means(result):
     law = unpack(panels["nis-law"].chart["data"][0]["y"])
     assert law[0] == 1.0
     assert np.isnan(law[-1])  # nothing inside the gate lies above 30
+
+
+def test_gains_are_drawn_with_their_intervals_and_tracks(result):
+    gains, law = beside.panels(result)
+    tracks, every, straight = gains.chart["data"]
+    assert unpack(every["x"]) == pytest.approx([0.02, -0.05])
+    assert unpack(straight["error_x"]["array"]) == pytest.approx([0.01, 0.03], rel=1e-5)
+    assert len(unpack(tracks["x"])) == 2 * len(result.targets)
+    assert set(np.round(unpack(tracks["x"]), 4)) == {np.float32(0.02), np.float32(-0.05)}
+    assert gains.chart["layout"]["yaxis"]["ticktext"] == ["mekf", "iekf"]
+    assert [each["name"] for each in law.chart["data"]] == ["ekf", "mekf", "iekf", "chi-square"]
+
+
+def test_one_filter_that_fails_does_not_squeeze_the_others(result):
+    far = replace(result.filters[2], gain=worlds._gain(-400.0, 100.0))
+    gains, _ = beside.panels(replace(result, filters=[*result.filters[:2], result.filters[2], far]))
+    assert gains.chart["layout"]["xaxis"]["range"][1] < 1.0
+
+
+def test_the_section_stands_only_where_filters_were_compared(result):
+    alone = replace(result, filters=result.filters[:1], scores=None)
+    html = report(alone).html
+    assert 'id="side-by-side"' not in html
+    assert not any(each.link == "side-by-side" for each in verdict.sentences(alone))
+
+
+def test_the_verdict_names_who_predicts_better_and_who_failed(result):
+    said = [each for each in verdict.sentences(result) if each.link == "side-by-side"]
+    assert [each.mark for each in said] == ["note", "attention"]
+    assert "better than ekf: mekf; worse than ekf: iekf" in said[0].html
+    assert said[1].html == "iekf: its state was not finite after 1 of 11,220 plots."
+    even = [replace(each, gain=worlds._gain(0.001, 0.002)) for each in result.filters]
+    said = verdict.sentences(replace(result, filters=even))
+    assert "none shows itself better or worse than ekf" in sentence(said, "side-by-side").html
+
+
+@pytest.mark.parametrize(
+    ("mean", "half", "said"),
+    [
+        (0.01234, 0.0045, "+0.0123 ± 0.0045"),
+        (-0.0584, 0.1013, "-0.06 ± 0.10"),
+        (-0.0002, 0.028, "+0.000 ± 0.028"),
+        (1e-7, 3e-7, "+0.0000 ± 0.0000"),
+        (-42.5, 12.0, "-42.5 ± 12.0"),
+        (float("nan"), float("nan"), "–"),
+    ],
+)
+def test_a_gain_keeps_two_digits_of_its_interval(mean, half, said):
+    assert gain(worlds._gain(mean, half)) == said
 
 
 def sentence(found, link):

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 from scipy import special
 
-from boresight.tracking.result import Comparison, TrackingResult
+from boresight.tracking.result import Comparison, FilterRow, Gain, TrackingResult
 
 SITE = (48.95, 2.45, 130.0)
 RANGE_SD_M, AZIMUTH_SD_DEG, HEIGHT_SD_M = 30.0, 0.08, 15.0
@@ -154,8 +154,55 @@ def result(targets=51, scans=220, seed=5):
             "azimuth_sd_deg": AZIMUTH_SD_DEG,
             "accel_mps2": 0.8,
         },
+        filters=filters(),
+        scores=_scores(residuals, rng),
         remarks=["Made up for a test: no filter has run."],
     )
+
+
+def _scores(residuals, rng):
+    """Scores of three made-up filters: the second better by 0.02 a plot, the third worse."""
+    loglik = rng.normal(-9.0, 1.0, len(residuals))
+    base = residuals.select("track", "time_s", "nis", "dof", "straight")
+    return pl.concat(
+        base.with_columns(
+            filter=pl.lit(name), loglik=loglik + gain, gain=pl.Series(np.full(len(base), gain))
+        )
+        for name, gain in (("ekf", 0.0), ("mekf", 0.02), ("iekf", -0.05))
+    )
+
+
+def filters():
+    """Three made-up filters side by side; the last failed once."""
+    none = Gain(mean=float("nan"), ci95=(float("nan"), float("nan")), plots=0, tracks=0)
+    gains = {"ekf": none, "mekf": _gain(0.02, 0.01), "iekf": _gain(-0.05, 0.03)}
+    return [
+        FilterRow(
+            filter=name,
+            updates=11_220,
+            rejected=12,
+            restarts=3,
+            failed_share=1e-4 if name == "iekf" else 0.0,
+            scored=5_600,
+            nis_per_dof=1.05,
+            nis_median=0.7,
+            loglik=-9.0,
+            gain=gain,
+            gain_straight=gain,
+            range_sd_m=31.0,
+            azimuth_sd_deg=0.081,
+            speed_error_median_mps=0.7,
+            speed_error_95_mps=3.1,
+            speeds=4_000,
+            ns_per_update=58.3,
+            remark="its state was not finite after 1 of 11,220 plots" if name == "iekf" else "",
+        )
+        for name, gain in gains.items()
+    ]
+
+
+def _gain(mean, half):
+    return Gain(mean=mean, ci95=(mean - half, mean + half), plots=5_600, tracks=51)
 
 
 def comparisons():

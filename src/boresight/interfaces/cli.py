@@ -42,6 +42,15 @@ Air = Annotated[
     Literal["none", "effective-earth", "exponential"],
     Parameter(help="The air whose delay is taken out of the ranges."),
 ]
+Filters = Annotated[
+    list[str] | None,
+    Parameter(
+        negative="",
+        show_default=lambda _: door.FILTER,
+        help="Which filter: see boresight cite. Several, or all, are compared on the same plots; "
+        "the tracks are those of the first.",
+    ),
+]
 Output = Annotated[Path, Parameter(alias="-o", help="Folder for report.html and the tables.")]
 Figures = Annotated[Path | None, Parameter(alias="-o", help="Folder for the paper's figures.")]
 
@@ -69,9 +78,7 @@ def track(
     sensor: Annotated[
         str | None, Parameter(help="Track this sensor's plots, SAC/SIC as inspect prints it.")
     ] = None,
-    filter: Annotated[  # noqa: A002 - the option is --filter
-        str, Parameter(help="Which filter: see boresight cite.")
-    ] = jobs.FILTER,
+    filter: Filters = None,  # noqa: A002 - the option is --filter
     atmosphere: Air = "none",
     strict: Strict = False,
     columns: Columns = None,
@@ -83,7 +90,7 @@ def track(
         file,
         site=door.site(site) if site is not None else None,
         sensor=sensor,
-        name=filter,
+        names=filter or [door.FILTER],
         atmosphere=door.atmosphere(atmosphere),
         strict=strict,
         columns=_columns(columns),

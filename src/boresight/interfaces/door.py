@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from boresight.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
+    from boresight.filters.method import Filter
     from boresight.maths.frames import Site
     from boresight.models.atmosphere import Atmosphere
 
@@ -55,6 +56,36 @@ def sensor(text: str, known: Sequence[str]) -> str:
             next_step=f"--sensor {known[0]}" if known else "boresight inspect FILE",
         )
     return name
+
+
+FILTER, ALL = "mekf", "all"
+
+
+def filters(texts: Sequence[str]) -> "tuple[list[Filter], bool]":
+    """Read filters' names, each text one or several parted by commas, `all` among them or not.
+
+    Returns:
+        The filters in the order of their names, the first to be tracked with, and whether `all`
+        was said: the rest of the catalogue then follows, as far as it can take the plots.
+
+    Raises:
+        UsageError: a name that the catalogue does not have, or has been said before.
+    """
+    from boresight import catalogue
+
+    said = [name.strip() for text in texts for name in text.split(",")]
+    twice = next((name for i, name in enumerate(said) if name in said[:i]), None)
+    if twice:
+        raise UsageError(
+            f"the filter {twice!r} is named twice",
+            next_step=f"--filter {','.join(dict.fromkeys(said))}",
+        )
+    chosen = [catalogue.lookup(name) for name in said if name != ALL]
+    if ALL in said:
+        chosen = chosen or [catalogue.lookup(FILTER)]
+        named = [each.name for each in chosen]
+        chosen += [catalogue.lookup(name) for name in catalogue.names() if name not in named]
+    return chosen, ALL in said
 
 
 def columns(text: str) -> dict[str, str]:

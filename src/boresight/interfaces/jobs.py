@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from boresight.models.atmosphere import Atmosphere
     from boresight.tracking.result import TrackingResult
 
-FILTER = "mekf"
 REPORT = "report.html"
 TABLES = ("tracks.parquet", "tracks.csv", "tracks.geojson")
 AGAINST_TRUTH = "Against the truth"
@@ -47,30 +46,32 @@ def track(
     *,
     site: "Site | None",
     sensor: str | None,
-    name: str,
+    names: Sequence[str],
     atmosphere: "Atmosphere | None",
     strict: bool,
     columns: Mapping[str, str] | None,
     folder: Path | None,
 ) -> Answer:
     """Track a recording; with a folder, write tables and the report into it."""
-    from boresight import catalogue
     from boresight.formats.recording import read_recording
     from boresight.interfaces.report import report
     from boresight.tracking.tracker import track as track_plots
 
-    chosen, target = catalogue.lookup(name), door.folder(folder) if folder else None
+    (first, *others), is_all = door.filters(names)
+    target = door.folder(folder) if folder else None
     with progress(f"Reading {file.name}", manner) as watch:
         read = read_recording(file, strict=strict, columns=columns, progress=watch.count)
     if read.plots.is_empty():
         raise no_plots(file, read.summary)
     source = door.sensor(sensor, sensors(read.summary)) if sensor else None
-    with progress(f"Tracking with {name}", manner) as watch:
+    with progress(f"Tracking with {first.name}", manner) as watch:
         result = track_plots(
             read.plots,
             site=site or own_site(read, source),
             sensor=source,
-            filter=chosen,
+            filter=first,
+            compare=others,
+            leave_out=is_all,
             atmosphere=atmosphere,
             progress=watch.count,
         )
@@ -150,6 +151,7 @@ def tracking_content(result: "TrackingResult", outputs: Sequence[str]) -> dict[s
         "rejected": result.rejected,
         "outputs": list(outputs),
         "nis": result.nis,
+        "filters": [asdict(each) for each in result.filters],
         "skipped": result.skipped.to_dicts(),
         "settings": result.settings,
         "remarks": result.remarks,

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from boresight.interfaces.report.plan import title
 from boresight.interfaces.report.tables import category
-from boresight.interfaces.report.words import NIS_WORDS, clock, figure, percent
+from boresight.interfaces.report.words import NIS_WORDS, clock, figure, gain, percent
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-    from boresight.tracking.result import Comparison, TrackingResult
+    from boresight.tracking.result import Comparison, Gain, TrackingResult
 
 WIDE = 100
 WORST = 8
@@ -83,7 +83,10 @@ def tracked(
         f"({percent(result.used, result.plots)}) in {figure(len(result.targets))} tracks, "
         f"filter {result.filter}; {figure(result.rejected)} outside their track's gate"
     )
-    parts = [_text(head, "bold"), _text(""), *truth, _nis(result), _worst(result, width)]
+    parts = [_text(head, "bold"), _text(""), *truth, _nis(result)]
+    if len(result.filters) > 1:
+        parts.append(_beside(result, width))
+    parts.append(_worst(result, width))
     if not result.skipped.is_empty():
         parts.append(_skipped(result))
     return [*parts, *_written(outputs)]
@@ -99,6 +102,32 @@ def _nis(result: "TrackingResult") -> "RenderableType":
         mean, median = (figure(entry.get(key), 3) for key in ("mean", "median"))
         table.add_row(words, mean, median, f"{entry.get('scans', 0):,.0f}")
     return table
+
+
+def _beside(result: "TrackingResult", width: int) -> "RenderableType":
+    """Filters on the same plots: how well each predicted them, and at what price."""
+    heading = f"Log-likelihood per plot minus that of {result.filter}, ± its 95 % interval"
+    more = ["restarts", "speed 95 %"] if width >= WIDE else []
+    heads = ["filter", "all flight", "straight", "NIS/dof", "rejected", *more, "ns"]
+    table = _table(heading, *heads)
+    for each in result.filters:
+        optional = [figure(each.restarts), f"{figure(each.speed_error_95_mps, 3)} m/s"]
+        table.add_row(
+            each.filter,
+            _gain(each.gain),
+            _gain(each.gain_straight),
+            figure(each.nis_per_dof, 3),
+            figure(each.rejected),
+            *(optional if more else []),
+            figure(each.ns_per_update, 2),
+        )
+    return table
+
+
+def _gain(value: "Gain") -> "RenderableType":
+    """Green where the filter predicts better than the first, red where worse, at 95 %."""
+    low, high = value.ci95
+    return _text(gain(value), "green" if low > 0 else "red" if high < 0 else "")
 
 
 def _worst(result: "TrackingResult", width: int) -> "RenderableType":

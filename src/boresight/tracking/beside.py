@@ -178,7 +178,7 @@ def _ns_per_update(case: Case, recursion: Recursion, site: Site) -> float:
     start, guarded = begin(z[:, 0], recursion, site), gated(recursion, scan)
     state: Any = start
     taken = []
-    for _ in range(4):  # the first compiles
+    for _ in range(9):  # the first compiles
         began = thread_time_ns()
         state = run_recursion(guarded, z, scan, state, outputs=("status",), last=True).final
         taken.append(thread_time_ns() - began)

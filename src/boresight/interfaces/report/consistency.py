@@ -1,5 +1,6 @@
 """Is the filter's own uncertainty true? NIS over time, range, azimuth, targets and as a law."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +32,7 @@ def panels(residuals: "pl.DataFrame", targets: "pl.DataFrame") -> list[Panel]:
     used = residuals.filter(residuals["used"] & residuals["nis"].is_finite())
     if used.is_empty():
         return []
-    return [*_against(used), _law(used), _targets(targets)]
+    return [*_against(used), law("nis-law", _groups(used), used), _targets(targets)]
 
 
 def bounds_of_mean(dof: Floats) -> tuple[Floats, Floats]:
@@ -130,27 +131,35 @@ def _ideal() -> Chart:
     return {"type": "line", "xref": "paper", "line": edge} | ends
 
 
-def _law(used: "pl.DataFrame") -> Panel:
-    """Draw the share of NIS above each value, against the chi-square law of the same plots."""
+def law(
+    name: str, groups: "Sequence[tuple[str, str, pl.DataFrame]]", used: "pl.DataFrame"
+) -> Panel:
+    """Draw the share of NIS above each value, against the chi-square law of the same plots.
+
+    Args:
+        name: of the panel.
+        groups: name, colour and plots (`nis`) of each line.
+        used: the plots whose degrees of freedom (`dof`) make the law.
+    """
     from scipy.special import chdtrc
 
     x = np.linspace(0.0, 30.0, 121)
     packed = charts.short(x, 16)
     data = [
-        charts.line(packed, charts.short(_share_above(frame, x)), color, name=name)
-        | {"hovertemplate": f"{name}: %{{y:.2%}} above %{{x:.1f}}<extra></extra>"}
-        for name, color, frame in _groups(used)
+        charts.line(packed, charts.short(_share_above(frame, x)), color, name=words)
+        | {"hovertemplate": f"{words}: %{{y:.2%}} above %{{x:.1f}}<extra></extra>"}
+        for words, color, frame in groups
     ]
     dof, number = np.unique(column(used, "dof"), return_counts=True)
     known = dof > 0
-    law = chdtrc(dof[known], x[:, None]) @ (number[known] / number[known].sum())
+    share = chdtrc(dof[known], x[:, None]) @ (number[known] / number[known].sum())
     ideal = {"line": {"color": charts.INK, "width": 1.4, "dash": "dot"}}
-    data.append(charts.line(packed, charts.short(law), charts.INK, name="chi-square") | ideal)
+    data.append(charts.line(packed, charts.short(share), charts.INK, name="chi-square") | ideal)
     floor = np.log10(0.5 / len(used))
     y = charts.axis("share above", type="log", range=[floor, 0.05], tickformat="~%", dtick=1)
     layout = charts.layout(xaxis=charts.axis("NIS of one plot"), yaxis=y, showlegend=True)
     alt = "share of plots whose NIS exceeds a value, measured and by the chi-square law"
-    return Panel("nis-law", {"data": data, "layout": layout}, alt)
+    return Panel(name, {"data": data, "layout": layout}, alt)
 
 
 def _share_above(frame: "pl.DataFrame", x: Floats) -> NDArray[np.float64]:

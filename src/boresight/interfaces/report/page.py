@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from boresight.errors import OutputError
 from boresight.interfaces.answers import plain
-from boresight.interfaces.report import charts, consistency, plan, residuals, sections, target
+from boresight.interfaces.report import (
+    beside,
+    charts,
+    consistency,
+    plan,
+    residuals,
+    sections,
+    target,
+)
 
 if TYPE_CHECKING:
     from boresight.tracking.result import Comparison, TrackingResult
@@ -80,6 +88,7 @@ def report(
     drawn = [
         *residuals.panels(result.residuals),
         *consistency.panels(result.residuals, result.targets),
+        *beside.panels(result),
     ]
     view, series = plan.plan(result), target.series(result)
     parts = sections.Parts(
@@ -141,6 +150,7 @@ def _facts(parts: sections.Parts) -> str:
         "rejected": result.rejected,
         "filter": result.filter,
         "nis": result.nis,
+        "filters": [asdict(each) for each in result.filters],
         "settings": result.settings,
         "remarks": result.remarks,
         "targets": result.targets.to_dicts(),

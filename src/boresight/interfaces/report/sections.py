@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from boresight.interfaces.report import tables
+from boresight.interfaces.report import beside, tables
 from boresight.interfaces.report.residuals import QUANTITIES, Panel, measured
 from boresight.interfaces.report.target import Series
 from boresight.interfaces.report.verdict import Sentence, sentences
@@ -53,6 +53,7 @@ def body(parts: Parts) -> str:
         ("plan", "Plan view", _plan(parts)),
         ("residuals", "Residuals", _residuals(parts)),
         ("consistency", "Is the stated uncertainty true?", _consistency(parts)),
+        ("side-by-side", "Filters side by side", beside.section(parts.result, parts.panels)),
         ("filters", "Filters against the known truth", _filters(parts)),
         ("targets", "Targets", _targets(parts)),
         ("skipped", "What was not used", tables.skipped(parts.result)),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from boresight.interfaces.report.beside import sentence
 from boresight.interfaces.report.consistency import chi_square_median
 from boresight.interfaces.report.plan import classes, title
 from boresight.interfaces.report.residuals import column, measured, robust_sd
@@ -40,6 +41,7 @@ def sentences(
         _against_truth(comparisons, as_seen),
         _straight(result),
         _turns(result),
+        _beside(result),
         _scatter(result),
         _use(result),
         _targets(result),
@@ -138,6 +140,14 @@ def _turns(result: "TrackingResult") -> Iterator[Sentence]:
             "a turn, and its covariance does not show it.",
             "consistency",
         )
+
+
+def _beside(result: "TrackingResult") -> Iterator[Sentence]:
+    if len(result.filters) > 1:
+        yield Sentence("note", sentence(result), "side-by-side")
+    failed = [f"{each.filter}: {each.remark}" for each in result.filters if each.remark]
+    if failed:
+        yield Sentence("attention", f"{escape('; '.join(failed))}.", "side-by-side")
 
 
 def _scatter(result: "TrackingResult") -> Iterator[Sentence]:

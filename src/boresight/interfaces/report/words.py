@@ -4,7 +4,10 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import partial
 from html import escape
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from boresight.tracking.result import Gain
 
 UNITS = {
     "_mps2": "m/s²",
@@ -41,6 +44,15 @@ def figure(value: float | None, digits: int = 4) -> str:
         return f"{value:,.0f}"
     places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
     return f"{value:,.{places}f}"
+
+
+def gain(value: "Gain") -> str:
+    """Render a difference of log-likelihoods: `+0.0123 ± 0.0045`; a dash for none."""
+    half = value.ci95[1] - value.mean
+    if not math.isfinite(half):
+        return f"{value.mean:+.4f}" if math.isfinite(value.mean) else "–"
+    places = min(max(1 - math.floor(math.log10(max(half, 1e-9))), 1), 4)
+    return f"{value.mean:+z.{places}f} ± {half:.{places}f}"
 
 
 def percent(part: float, whole: float) -> str:
