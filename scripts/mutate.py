@@ -24,7 +24,7 @@ LAWS = [
     f"tests/laws/test_{name}.py"
     for name in ("linalg", "motions", "components", "linear_world", "textbook", "starts")
 ]
-LAWS += ["tests/laws/test_symmetries.py"]
+LAWS += ["tests/laws/test_smoother.py", "tests/laws/test_symmetries.py"]
 KERNELS = [f"tests/lanes/test_{name}.py" for name in ("refusals", "program", "elementary")]
 KERNELS += ["tests/lanes/test_kernels.py", "tests/laws/test_runs.py", "tests/lanes/test_cache.py"]
 COMPILED = ("lanes/", "filters/recursion")
@@ -133,6 +133,17 @@ FAULTS = (
         ("return nis, dof, -0.5 *", "return nis, dof, 0.5 *"),
         ("LOG_TWO_PI * dof", "LOG_TWO_PI"),
         ("np.log(2.0 * np.pi)", "np.log(np.pi)"),
+    ),
+    *_faults(
+        "filters/smoother.py",
+        ("following.mean - moved", "following.mean - filtered.mean"),
+        ("G @ (Q + following.cov) @ G.T", "G @ following.cov @ G.T"),
+        ("rest = L - G @ D", "rest = L"),
+        ("spread = float(np.sqrt(len(mean)))", "spread = 1.0"),
+        ("motion.noise(dt) + bend.T @ bend / len(mean)", "motion.noise(dt)"),
+        ("abs(pivot) <= _ROUNDING * A[j, j]", "pivot < 0.0"),
+        ("np.roll(np.flip(value, axis), 1, axis)", "np.flip(value, axis)"),
+        ("there = size < np.inf", "there = size > 0.0"),
     ),
     *_faults(
         "filters/start.py",

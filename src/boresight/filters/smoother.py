@@ -31,7 +31,7 @@ from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, with_numbers
 
 Array = Any
-_ROUNDING = 1e-14  # of a variance: a pivot below it is what subtraction left of zero
+_ROUNDING = 3e-15  # of a variance: a pivot below it is what subtraction left of zero
 
 
 class Step(NamedTuple):
@@ -62,7 +62,7 @@ def tangent(mean: Array, L: Array, motion: Motion, dt: Any) -> Step:
 
 
 def cubature(mean: Array, L: Array, motion: Motion, dt: Any) -> Step:
-    """The motion regressed on 2n cubature points (sarkka2008 (10) to (12), with their weights).
+    """The motion regressed on 2n cubature points: sarkka2008's smoother, with equal weights.
 
     Half the difference of a pair of moved points is what becomes of a column of L; how the pairs'
     midpoints scatter is curvature, and is added to the noise. So nothing cancels.
@@ -98,8 +98,8 @@ def backward(
         linearisation: one of `LINEARISATIONS`.
 
     Returns:
-        rauch1965 (3.27) to (3.29): with the gain G = L D' (D D' + Q)^-1, the covariance is
-        (L - G D)(L - G D)' + G (Q + Ps) G', which is their P - G (D D' + Q - Ps) G'.
+        With the gain G = L D' (D D' + Q)^-1, the covariance is (L - G D)(L - G D)' +
+        G (Q + Ps) G', which is rauch1965's P - G (D D' + Q - Ps) G' as a sum of squares.
     """
     L, _ = _factor(filtered.cov)
     moved, D, Q = LINEARISATIONS[linearisation](filtered.mean, L, motion, dt)
