@@ -1,4 +1,4 @@
-"""Errata K1 to K4, K10, K11: what kashyap prints fails, what the package does passes.
+"""Errata K1 to K5, K10, K11, K13: what kashyap prints fails, what the package does passes.
 
 Monte Carlo figures carry their standard error; a difference counts from five of them.
 """
@@ -13,9 +13,11 @@ from boresight.filters import mekf
 from boresight.filters.recursion import Recursion, run_recursion
 from boresight.filters.steps import Updating
 from boresight.maths import Gaussian, gradient
+from boresight.models.conversions import convert
 from boresight.models.motion import ConstantVelocity, Static
+from boresight.models.polar import Given
 from boresight.models.sensors import Radar
-from oracles import printed, textbook
+from oracles import printed, printed_conversions, quadrature, textbook
 
 RANGE, AZIMUTH, ELEVATION = 0, 1, 2
 NOISE = 0.1  # rad, of both angles
@@ -160,6 +162,27 @@ def test_k4_every_reading_is_the_extended_filter_where_nothing_curves(mu):
     sd = np.sqrt(np.diag(expected_cov))
     assert np.max(np.abs(found.mean[0, 0] - expected) / sd) < 1e-3
     assert np.max(np.abs(found.cov[0, 0] - expected_cov) / np.outer(sd, sd)) < 1e-3
+
+
+def test_k5_noise_of_the_range_fades_with_twice_the_square_of_the_angle():
+    """25 degrees, 30 m at 100 m: the printed factor makes the variance a tenth too large."""
+    z, sigma = [100.0, 0.6], [30.0, np.radians(25.0)]
+    _, exact = quadrature.Predicted(z, sigma, sigma).debiased()
+    found = convert("cmkf-d-m", z, sigma).cov[0, 0]
+    assert found == pytest.approx(float(exact[0, 0]), rel=1e-12)
+    assert printed_conversions.debiased_by_plot(*z, *sigma, factor=2.0) == pytest.approx(found)
+    assert printed_conversions.debiased_by_plot(*z, *sigma) > 1.09 * found
+
+
+def test_k13_the_bias_is_taken_off_the_converted_plot():
+    truth, sigma = [1000.0, -2.1], [30.0, np.radians(15.0)]
+    z, weights = quadrature.normal(truth, sigma)
+    plain = convert("conventional", z, sigma).mean
+    found = convert("cmkf-d-t", z, sigma, Given(truth, [0.0, 0.0])).mean
+    x = quadrature.cartesian(np.array(truth))
+    assert np.allclose((found @ weights).astype(float), x, rtol=1e-12)
+    added = plain + (plain - found)  # the other sign
+    assert np.linalg.norm((added @ weights).astype(float) - x) > 60.0
 
 
 def test_k10_unwrapped_differences_hurt_exactly_the_runs_that_cross_south():
