@@ -1,12 +1,15 @@
 """Every table, figure and claim of a paper again, each with a verdict."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from boresight.errors import UsageError
+from boresight.experiments.scenario import paper
 
 _PAPERS = ("aditya",)
 SEED = 1
@@ -18,7 +21,12 @@ def paper_keys() -> tuple[str, ...]:
 
 
 def reproduce(
-    key: str, *, runs: int | None = None, seed: int = SEED, output: str | Path | None = None
+    key: str,
+    *,
+    runs: int | None = None,
+    seed: int = SEED,
+    output: str | Path | None = None,
+    assume: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Run a paper again and judge every table, figure and claim of it.
 
@@ -27,18 +35,24 @@ def reproduce(
         runs: Monte Carlo runs; left out, as many as the paper's claims need.
         seed: of all that is random.
         output: folder for the figures; left out, none are drawn.
+        assume: what a paper leaves open, by the names in its table's `assumed`, such as
+            {"dt_s": 2.0}; left out, as the table has it, with a reason for each.
 
     Returns:
         `claims`, each with `id`, `where`, `published`, `ours`, `band`, `verdict`, `assumption`
         (and `parts` where it has some); `figures`, the files written; `seed`.
 
     Raises:
-        UsageError: an unknown paper.
+        UsageError: an unknown paper or assumption.
         MissingExtraError: figures are asked for and matplotlib is not installed.
     """
     keys = _PAPERS if key == "all" else (_known(key),)
     folder = None if output is None else Path(output)
-    results = [_paper(name)(runs=runs, seed=seed, output=folder) for name in keys]
+    tables = [_assuming(name, assume or {}) for name in keys]
+    results = [
+        _paper(name)(table, runs=runs, seed=seed, output=folder)
+        for name, table in zip(keys, tables, strict=True)
+    ]
     return {
         "claims": [claim.as_dict() for claims, _ in results for claim in claims],
         "figures": [file for _, files in results for file in files],
@@ -54,6 +68,23 @@ def _known(key: str) -> str:
         f"no paper {key!r} can be reproduced" + (f"; did you mean {near[0]!r}?" if near else ""),
         next_step=f"use one of {', '.join(_PAPERS)}, or all",
     )
+
+
+def _assuming(key: str, assume: Mapping[str, Any]) -> dict[str, Any]:
+    """A paper's table with assumptions changed."""
+    table = paper(key)
+    for name, value in assume.items():
+        usual = table["assumed"].get(name)
+        if usual is None:
+            near = get_close_matches(name, table["assumed"], n=1)
+            raise UsageError(
+                f"{key} has no assumption {name!r}"
+                + (f"; did you mean {near[0]!r}?" if near else ""),
+                next_step=f"use {', '.join(table['assumed'])}",
+            )
+        if isinstance(value, str) != isinstance(usual, str) or np.ndim(value) != np.ndim(usual):
+            raise UsageError(f"{name}={value!r} cannot stand for {key}'s {name}={usual!r}")
+    return table | {"assumed": table["assumed"] | dict(assume)}
 
 
 def _paper(key: str) -> Callable[..., Any]:

@@ -1,27 +1,29 @@
 """Scenarios: what a target does, what sees it, and where a filter may begin.
 
 The papers' scenarios are built from `papers/<key>.toml`, where their numbers stand, and nowhere
-else. All are in SI units but for `aditya`, whose lengths are km (erratum A7): a sensor of that
-scenario takes its range in km too, whatever its argument is called.
+else. All are in SI units (`bordonaro`'s feet become metres) but for `aditya`, whose lengths are km
+(erratum A7): a sensor of that scenario takes its range in km too, whatever its argument is called.
 """
 
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.filters.start import SPEED_MPS
 from boresight.maths import Gaussian
-from boresight.models.motion import ConstantVelocity, Motion, SphericalUnitRate
+from boresight.models.motion import ConstantVelocity, Motion, SphericalUnitRate, Static
 from boresight.models.sensors import Radar, Sensor
 
 Array = Any
 Begin = Literal["random draw", "given", "one plot", "two plots"]
+FOOT_M = 0.3048
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,11 +34,15 @@ class Scenario:
         name: what `simulate` is called with; also the cell of its random numbers.
         motion: how the target moves; its noise moves the truth too.
         sensor: what sees it, unless another is given.
-        initial: (n,) where every truth starts, exactly, at time 0.
+        initial: (n,) where every truth starts, exactly, at time 0; or their centre, if `draw` says
+            where each one starts.
         prior_cov: (n, n) how uncertain a filter is of that.
+        draw: makes of standard normals (runs, n) the states (runs, n) where truths start; None:
+            all start at `initial`.
         begin: `random draw`: each run's filter starts at its own draw from N(initial, prior_cov);
             `given`: at `initial`; `one plot`, `two plots`: from the first plots, which are then
             not used again.
+        speed_mps: spread of each velocity that a start from one plot cannot know.
         dt_s: s between scans.
         scans: number of scans.
         first_at_start: whether the first scan is at time 0, or one step later.
@@ -49,7 +55,9 @@ class Scenario:
     sensor: Sensor
     initial: Array
     prior_cov: Array
+    draw: Callable[[Array], Array] | None = None
     begin: Begin = "random draw"
+    speed_mps: float = SPEED_MPS
     dt_s: float = 1.0
     scans: int
     first_at_start: bool = True
@@ -136,19 +144,54 @@ def _aditya(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
     )
 
 
+def _bordonaro(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
+    printed, rest = table["settings"][own["settings"]], own["velocities"]
+    vague = printed["position_sd_ft"] or max(printed["position_ft"])
+    spread = [vague] * 2 + [printed["start_speed_ftps"]] * rest
+    return Scenario(
+        name=name,
+        motion=ConstantVelocity(accel_mps2=0.0, dims=2) if rest else Static(dims=2),
+        sensor=Radar(
+            range_m=FOOT_M * printed["sigma_range_ft"],
+            azimuth_deg=max(printed["sigma_bearing_deg"]),
+        ),
+        initial=FOOT_M * np.array(printed["position_ft"] + [0.0] * rest),
+        prior_cov=np.diag(np.square(FOOT_M * np.array(spread))),
+        draw=partial(_anywhere, printed) if rest else None,
+        begin="one plot",
+        speed_mps=FOOT_M * printed["start_speed_ftps"],
+        dt_s=table["assumed"]["dt_s"],
+        scans=printed["scans"],
+        source=own["where"],
+    )
+
+
+def _anywhere(printed: dict[str, Any], normals: Array) -> Array:
+    """States [x, y, vx, vy] of targets near a point, of normal speed and uniform heading."""
+    from scipy.special import ndtr
+
+    position = printed["position_ft"] + printed["position_sd_ft"] * normals[:, :2]
+    speed = printed["speed_ftps"] + printed["speed_sd_ftps"] * normals[:, 2]
+    heading = 2.0 * np.pi * ndtr(normals[:, 3])
+    velocity = speed * np.array([np.cos(heading), np.sin(heading)])
+    return FOOT_M * np.hstack([position, velocity.T])
+
+
 _BUILDERS: dict[str, Callable[[str, dict[str, Any], dict[str, Any]], Scenario]] = {
     "kashyap": _kashyap,
     "aditya": _aditya,
+    "bordonaro": _bordonaro,
 }
+
+
+def build(key: str, table: dict[str, Any]) -> dict[str, Scenario]:
+    """The scenarios of a paper, from its table or from one in which assumptions were changed."""
+    return {name: _BUILDERS[key](name, own, table) for name, own in table["scenarios"].items()}
 
 
 @cache
 def _scenarios() -> dict[str, Scenario]:
-    return {
-        name: build(name, own, table)
-        for build, table in ((build, paper(key)) for key, build in _BUILDERS.items())
-        for name, own in table["scenarios"].items()
-    }
+    return {name: one for key in _BUILDERS for name, one in build(key, paper(key)).items()}
 
 
 def scenario_names() -> tuple[str, ...]:

@@ -90,6 +90,8 @@ def simulate(
     inputs = {"root": root, "pushes": draw(Stream.TRUTH, world.scans, root.shape[2])}
     inputs |= {"dt": world.dt[0], "noise": draw(Stream.NOISE, world.scans, k)}
     start = np.broadcast_to(world.initial, (runs, n))
+    if world.draw:
+        start = world.draw(draw(Stream.ORIGIN, n))
     states, z = _run(world.motion, eye, start, inputs)
     truth = Truth(world.time_s, states, world.motion.names, start)
     return truth, _plots(world, eye, z, draw(Stream.START, n))
@@ -103,7 +105,7 @@ def _plots(world: Scenario, sensor: Sensor, z: Array, normal: Array) -> Plots:
     elif world.begin == "random draw":
         prior = Gaussian(world.initial + normal @ root_of(world.prior_cov).T, world.prior_cov)
     elif world.begin == "one plot":
-        prior = one_plot(z[:, 0], world.motion, sensor)
+        prior = one_plot(z[:, 0], world.motion, sensor, speed_mps=world.speed_mps)
         z, dt = _spent(z, dt, 1)
     else:
         prior = two_plots(z[:, 0], z[:, 1], dt[0, 1], world.motion, sensor)

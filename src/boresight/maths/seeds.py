@@ -26,6 +26,7 @@ class Stream(IntEnum):
     TRUTH = 0
     NOISE = 1
     START = 2
+    ORIGIN = 3
 
 
 def normals(

@@ -24,7 +24,8 @@ from boresight.experiments.papers.aditya_study import (
     study,
     told_by_plots,
 )
-from boresight.experiments.scenario import lookup, paper
+from boresight.experiments.papers.figures import require
+from boresight.experiments.scenario import build
 from boresight.experiments.verdicts import Claim, band_of, of_number, of_share, worst
 from boresight.maths import jacobian
 
@@ -32,13 +33,15 @@ KEY, RUNS = "aditya", 400
 READINGS = ("aditya", "aditya-r-as-printed")
 
 
-def reproduce(*, runs: int | None, seed: int, output: Path | None) -> tuple[list[Claim], list[str]]:
+def reproduce(
+    table: dict[str, Any], *, runs: int | None, seed: int, output: Path | None
+) -> tuple[list[Claim], list[str]]:
     """All claims, and the files of the figures if there is a folder for them."""
     if output:
-        aditya_figures.require()
-    table = paper(KEY)
+        require()
+    worlds = build(KEY, table)
     cases = list(product(READINGS, table["assumed"]["scans_tried"]))
-    studies = [study(replace(lookup(r), scans=scans), runs or RUNS, seed) for r, scans in cases]
+    studies = [study(replace(worlds[r], scans=scans), runs or RUNS, seed) for r, scans in cases]
     sigma = studies[cases.index((READINGS[0], table["assumed"]["scans"]))]
     best = max(studies, key=lambda one: _inside(_numbers(table, one)))
     claims = [

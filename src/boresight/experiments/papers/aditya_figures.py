@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from boresight.errors import MissingExtraError, OutputError
 from boresight.experiments.papers.aditya_study import Study
+from boresight.experiments.papers.figures import save, writing_into
 
 Array = Any
 _INK = {"truth": "tab:green", "ekf": "tab:blue", "mekf": "tab:red"}  # the paper's own colours
@@ -30,28 +30,12 @@ def write(one: Study, folder: Path) -> list[str]:
     curves = {"truth": one.truth.states[0]}
     curves |= {name: estimate.mean[0] for name, estimate in one.estimates.items()}
     files = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with writing_into(folder):
         for i, state in enumerate(states):
             lines = {name: values[:, i] for name, values in curves.items()}
             files += _plot(folder / f"AD-F{i + 2}", one.truth.time_s, [(state, lines)])
         files += _plot(folder / f"AD-F{len(states) + 2}", one.truth.time_s, _errors(states, curves))
-    except OSError as error:
-        raise OutputError(
-            f"cannot write figures into {folder}", why=str(error), next_step="give another folder"
-        ) from error
     return files
-
-
-def require() -> None:
-    """Raise MissingExtraError if figures cannot be drawn."""
-    try:
-        import matplotlib.figure  # noqa: F401 - only whether it is there
-    except ImportError as error:
-        raise MissingExtraError(
-            "figures need matplotlib, which is not installed",
-            next_step="pip install 'boresight[figures]'",
-        ) from error
 
 
 def _errors(states: tuple[str, ...], curves: dict[str, Array]) -> list[tuple[str, Any]]:
@@ -75,16 +59,7 @@ def _plot(path: Path, time_s: Array, panels: list[tuple[str, dict[str, Array]]])
             place.plot(time_s, values, label=name.upper(), color=_INK[name], linewidth=1)
         place.set(xlabel="time, s", ylabel=label)
         place.legend(fontsize="small")
-    figure.savefig(path.with_suffix(".png"), dpi=150)
     columns_of = {"time_s": time_s} | {
         f"{label} {name}": values for label, lines in panels for name, values in lines.items()
     }
-    np.savetxt(
-        path.with_suffix(".csv"),
-        np.stack(list(columns_of.values()), axis=-1),
-        delimiter=",",
-        header=",".join(columns_of),
-        comments="",
-        fmt="%.9g",
-    )
-    return [str(path.with_suffix(suffix)) for suffix in (".png", ".csv")]
+    return save(figure, path, columns_of)

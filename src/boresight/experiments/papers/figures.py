@@ -1,0 +1,59 @@
+"""Figures as files: a picture, and beside it a table of the numbers in it."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import MissingExtraError, OutputError
+
+Array = Any
+_DOTS_PER_INCH = 150
+
+
+def require() -> None:
+    """Raise MissingExtraError if figures cannot be drawn."""
+    try:
+        import matplotlib.figure  # noqa: F401 - only whether it is there
+    except ImportError as error:
+        raise MissingExtraError(
+            "figures need matplotlib, which is not installed",
+            next_step="pip install 'boresight[figures]'",
+        ) from error
+
+
+@contextmanager
+def writing_into(folder: Path) -> Iterator[None]:
+    """Make a folder if it is not there; OutputError if it cannot be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise OutputError(
+            f"cannot write figures into {folder}", why=str(error), next_step="give another folder"
+        ) from error
+
+
+def save(figure: Any, path: Path, columns: Mapping[str, Array]) -> list[str]:
+    """Write a figure as PNG and its numbers as CSV.
+
+    Args:
+        figure: of matplotlib.
+        path: of both files, without suffix.
+        columns: numbers by name, each as long as the others.
+
+    Returns:
+        The files' names.
+    """
+    figure.savefig(path.with_suffix(".png"), dpi=_DOTS_PER_INCH)
+    np.savetxt(
+        path.with_suffix(".csv"),
+        np.stack(list(columns.values()), axis=-1),
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+        fmt="%.9g",
+    )
+    return [str(path.with_suffix(suffix)) for suffix in (".png", ".csv")]
