@@ -91,13 +91,13 @@ Found = TypeVar("Found")
 Conversion = Callable[[Plot, Given | None], Gaussian]
 
 
-def cartesian(sheet: Sheet, where: Place, dims: int) -> Array:
+def cartesian(sheet: Sheet, where: Place) -> Array:
     """The covariance (d, d) that a sheet is, averaged over the azimuth it is turned to."""
     along, across, up, tilt = sheet
     cos, sin, cos2, sin2, product = where.azimuth
     xx, yy = along * cos2 + across * sin2, along * sin2 + across * cos2
     xy = (along - across) * product
-    if dims == 2:
+    if where.dims == 2:
         return np.array([[xx, xy], [xy, yy]])
     xz, yz = tilt * cos, tilt * sin
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, up]])
@@ -136,6 +136,7 @@ def _sum(a: Sheet, b: Sheet) -> Sheet:
 
 
 def stretched(point: Array, ground: Any, up: Any) -> Array:
+    """A point (d,), longer on the ground and in height."""
     return np.array([x * f for x, f in zip(point, (ground, ground, up), strict=False)])
 
 
@@ -158,7 +159,7 @@ def _conventional(plot: Plot, given: Given | None) -> Gaussian:
         up=sr2 * e.sin2 + square * se2 * e.cos2,
         tilt=(sr2 - square * se2) * e.product,
     )
-    return Gaussian(plot.point, cartesian(linear, plot.at, len(plot.z)))
+    return Gaussian(plot.point, cartesian(linear, plot.at))
 
 
 def _debiased(plot: Plot, given: Given | None) -> Gaussian:
@@ -170,10 +171,10 @@ def _debiased(plot: Plot, given: Given | None) -> Gaussian:
             next_step="give a place (a prediction may stand in), or use cmkf-d-m",
         )
     where = place(given)
-    bias = stretched(mean_point(where, len(plot.z)), *plot.loss)
+    bias = stretched(mean_point(where), *plot.loss)
     mean = np.array([u + b for u, b in zip(plot.point, bias, strict=True)])
     spread = _scaled(true_spread(plot, where), *plot.shrink)
-    return Gaussian(mean, cartesian(spread, where, len(plot.z)))
+    return Gaussian(mean, cartesian(spread, where))
 
 
 def _debiased_by_plot(plot: Plot, given: Given | None) -> Gaussian:
@@ -191,7 +192,7 @@ def _modified_unbiased(plot: Plot, given: Given | None) -> Gaussian:
     """Bordonaro (14) to (18)."""
     del given
     mean = stretched(plot.point, *plot.shrink)
-    return Gaussian(mean, cartesian(_posterior(plot), plot.at, len(plot.z)))
+    return Gaussian(mean, cartesian(_posterior(plot), plot.at))
 
 
 def _unstretched(plot: Plot) -> Array:
@@ -212,7 +213,7 @@ def _unbiased(plot: Plot, given: Given | None) -> Gaussian:
     """Bordonaro (6), (7) and (11) to (13)."""
     del given
     squared = _scaled(_second_moment(plot.at), *bias_given_plot(plot))
-    cov = cartesian(_sum(_posterior(plot), squared), plot.at, len(plot.z))
+    cov = cartesian(_sum(_posterior(plot), squared), plot.at)
     return Gaussian(_unstretched(plot), cov)
 
 
@@ -226,7 +227,7 @@ def _least_square(plot: Plot, given: Given | None) -> Gaussian:
     short = [lost + kept * rest for lost, kept in zip(plot.loss, plot.shrink, strict=True)]
     noise = _scaled(true_spread(plot, where), *[eta * kept for kept in plot.shrink])
     error = _sum(noise, _scaled(_second_moment(where), *short))
-    return Gaussian(stretched(plot.point, eta, eta), cartesian(error, where, len(plot.z)))
+    return Gaussian(stretched(plot.point, eta, eta), cartesian(error, where))
 
 
 def _decorrelated(plot: Plot, given: Given | None) -> Gaussian:
@@ -234,7 +235,7 @@ def _decorrelated(plot: Plot, given: Given | None) -> Gaussian:
     if given is None:
         return _unbiased(plot, None)
     where = place(given)
-    return Gaussian(_unstretched(plot), cartesian(true_spread(plot, where), where, len(plot.z)))
+    return Gaussian(_unstretched(plot), cartesian(true_spread(plot, where), where))
 
 
 CONVERSIONS: dict[str, Conversion] = {
@@ -266,7 +267,7 @@ def understand(z: Array, sigma: Array) -> Plot:
     noises = [angle_noise(v) for v in variances[1:]]
     t, p = [*noises, EXACT][:2]
     loss = t.loss + p.loss * t.shrink
-    point = mean_point(at, len(z))
+    point = mean_point(at)
     return Plot(z, variances, at, point, t, p, (t.shrink * p.shrink, p.shrink), (loss, p.loss))
 
 

@@ -83,7 +83,7 @@ def convert_with_rate(
     rate, spread, shared = (z[-1], 0.0, 0.0) if given is None else given[1:]
     cross = where.range * rate + shared
     variance = _product_variance(where.square, rate * rate + spread, cross, noise)
-    pulls = _pulls(where, rate, noise, len(plot.z))
+    pulls = _pulls(where, rate, noise)
     if given is None:
         variance, pulls = _about_the_plot(plot, variance, pulls, noise)
     position = conditioned("ducm", plot, None if given is None else given.place)
@@ -97,15 +97,15 @@ def _product_variance(range2: Any, rate2: Any, cross: Any, noise: RateNoise) -> 
     return range2 * noise.rate + rate2 * noise.range + 2.0 * cross * noise.both + both
 
 
-def _pulls(where: Place, rate: Any, noise: RateNoise, dims: int) -> Array:
+def _pulls(where: Place, rate: Any, noise: RateNoise) -> Array:
     """Covariance (d,) of the unbiased position with xi."""
     pull = rate * noise.range + where.range * noise.both
-    return np.array([pull * u for u in mean_direction(where, dims)])
+    return np.array([pull * u for u in mean_direction(where)])
 
 
 def _about_the_plot(plot: Plot, variance: Any, pulls: Array, noise: RateNoise) -> tuple[Any, Array]:
     """The same of the errors given the plot, whose means are b and -2 c: moments about zero."""
-    bias = stretched(mean_point(plot.at, len(plot.z)), *bias_given_plot(plot))
+    bias = stretched(mean_point(plot.at), *bias_given_plot(plot))
     shrunk = stretched(pulls, *plot.shrink)
     lag = -2.0 * noise.both
     moved = [p + lag * b for p, b in zip(shrunk, bias, strict=True)]

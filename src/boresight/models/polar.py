@@ -48,6 +48,7 @@ class Place(NamedTuple):
     square: Any
     azimuth: Angle
     elevation: Angle
+    dims: int
 
 
 class Noise(NamedTuple):
@@ -90,18 +91,19 @@ def place(given: Given) -> Place:
     if trig is None:
         trig = [f(angle) for angle in angles for f in (np.cos, np.sin)]
     averages = [average_angle(trig[2 * i], trig[2 * i + 1], v) for i, v in enumerate(variances)]
-    return Place(distance, distance * distance + spread, *[*averages, LEVEL][:2])
+    azimuth, elevation = [*averages, LEVEL][:2]
+    return Place(distance, distance * distance + spread, azimuth, elevation, 1 + len(angles))
 
 
-def mean_direction(where: Place, dims: int) -> Array:
+def mean_direction(where: Place) -> Array:
     """Average (d,) of the unit vector that points at the target."""
     azimuth, (low, high) = where.azimuth, where.elevation[:2]
-    return np.array([low * azimuth.cos, low * azimuth.sin, high][:dims])
+    return np.array([low * azimuth.cos, low * azimuth.sin, high][: where.dims])
 
 
-def mean_point(where: Place, dims: int) -> Array:
+def mean_point(where: Place) -> Array:
     """Average Cartesian position (d,)."""
-    return np.array([where.range * u for u in mean_direction(where, dims)])
+    return np.array([where.range * u for u in mean_direction(where)])
 
 
 def angle_noise(variance: Any) -> Noise:
