@@ -136,16 +136,18 @@ def polar_moments(position: Array, cov: Array) -> Given:
     on_axis = x * x + y * y < _FLOOR
     x, y = select(on_axis, 1e-3, x), select(on_axis, 0.0, y)
     ground = np.sqrt(x * x + y * y)
-    cos, sin = x / ground, y / ground
-    azimuth, turned = np.arctan2(y, x), [-sin, cos]
-    spread = _quadratic(cov[:2, :2], turned) / (ground * ground)
+    inverse = 1.0 / ground
+    cos, sin = x * inverse, y * inverse
+    azimuth = np.arctan2(y, x)
+    turned = _quadratic(cov, [-sin, cos]) * inverse * inverse
     if not rest:
         away = _quadratic(cov, [cos, sin])
-        return Given(np.array([ground, azimuth]), np.array([away, spread]), np.array([cos, sin]))
+        return Given(np.array([ground, azimuth]), np.array([away, turned]), np.array([cos, sin]))
     z = rest[0]
     r = np.sqrt(ground * ground + z * z)
-    low, high = ground / r, z / r
+    inverse = 1.0 / r
+    low, high = ground * inverse, z * inverse
     away = _quadratic(cov, [cos * low, sin * low, high])
-    raised = _quadratic(cov, [-cos * high, -sin * high, low]) / (r * r)
+    raised = _quadratic(cov, [-cos * high, -sin * high, low]) * inverse * inverse
     mean = np.array([r, azimuth, np.arctan2(z, ground)])
-    return Given(mean, np.array([away, spread, raised]), np.array([cos, sin, low, high]))
+    return Given(mean, np.array([away, turned, raised]), np.array([cos, sin, low, high]))
