@@ -7,6 +7,7 @@ from inspect import getdoc, getmodule
 
 from boresight.errors import UsageError
 from boresight.filters import ekf, kalman, mekf
+from boresight.filters.converted import Converted
 from boresight.filters.method import Filter
 
 _FILTERS = {
@@ -47,6 +48,54 @@ _FILTERS = {
             formula=mekf.update_block,
             summary="modified extended Kalman filter, all components at once",
             paper="aditya",
+        ),
+        Filter(
+            name="cmkf",
+            formula=Converted,
+            summary="converted-measurement Kalman filter, conventional conversion",
+            paper="kashyap",
+            predict=None,
+            settings=(("conversion", "conventional"),),
+        ),
+        Filter(
+            name="cmkf-d",
+            formula=Converted,
+            summary="converted measurements, debiased by what the plot says (CMKF-D-M)",
+            paper="lerro1993",
+            predict=None,
+            settings=(("conversion", "cmkf-d-m"),),
+        ),
+        Filter(
+            name="ucm",
+            formula=Converted,
+            summary="converted measurements, unbiased",
+            paper="mo1998",
+            predict=None,
+            settings=(("conversion", "ucm"),),
+        ),
+        Filter(
+            name="mucm",
+            formula=Converted,
+            summary="converted measurements, unbiased given the plot (modified)",
+            paper="duan2004",
+            predict=None,
+            settings=(("conversion", "mucm"),),
+        ),
+        Filter(
+            name="mmse",
+            formula=Converted,
+            summary="converted measurements, scaled to the least mean square error",
+            paper="bordonaro",
+            predict=None,
+            settings=(("conversion", "mmse"),),
+        ),
+        Filter(
+            name="ducm",
+            formula=Converted,
+            summary="converted measurements, unbiased, noise taken at the prediction",
+            paper="bordonaro",
+            predict=None,
+            settings=(("conversion", "ducm"),),
         ),
     )
 }

@@ -136,6 +136,14 @@ FILTERS = (
     Entry("mekf", {"mu": "none", "added_variance": False}),
     Entry("mekf-block"),
     Entry("mekf-block", {"mu": False, "added_variance": False}),
+    Entry("cmkf"),
+    Entry("cmkf-d"),
+    Entry("cmkf-d", {"conversion": "cmkf-d-t"}),
+    Entry("ucm"),
+    Entry("mucm"),
+    Entry("mmse"),
+    Entry("ducm"),
+    Entry("ducm", {"conditioning": "previous measurement"}),
 )
 CURVED = tuple(entry for entry in FILTERS if entry.curved)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from boresight.errors import UsageError
 from boresight.maths import Gaussian
+from boresight.models.conversions import convert
 from boresight.models.coordinates import CartesianPlots, PositionSensor
 from boresight.models.motion import Motion
 from boresight.models.sensors import Radar, Sensor
@@ -37,7 +38,14 @@ def random_draw(prior: Gaussian, generator: np.random.Generator, lanes: int) -> 
     return Gaussian(np.asarray(prior.mean) + normals @ root.T, prior.cov)
 
 
-def one_plot(z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float = SPEED_MPS) -> Gaussian:
+def one_plot(
+    z: Array,
+    motion: Motion,
+    sensor: Sensor,
+    *,
+    speed_mps: float = SPEED_MPS,
+    conversion: str = "conventional",
+) -> Gaussian:
     """Position from one plot, velocity unknown. Paper: kashyap (3), with R = J R J'.
 
     Args:
@@ -45,11 +53,12 @@ def one_plot(z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float = SPE
         motion: state layout.
         sensor: a radar with range, azimuth and, in three dimensions, elevation; or coordinates.
         speed_mps: standard deviation of each velocity.
+        conversion: of polar plots, with the covariance that it has given the plot.
 
     Returns:
         mean (lanes, n), cov (lanes, n, n); NaN where the plot lacks a component that is needed.
     """
-    position, spread = locate(z, motion, sensor)
+    position, spread = locate(z, motion, sensor, conversion)
     n, dims = len(motion.names), motion.dims
     mean = np.zeros((len(position), n))
     cov = np.zeros((len(position), n, n))
@@ -86,7 +95,9 @@ def two_plots(first: Array, second: Array, dt: Array, motion: Motion, sensor: Se
     return Gaussian(mean, cov)
 
 
-def locate(z: Array, motion: Motion, sensor: Sensor) -> tuple[Array, Array]:
+def locate(
+    z: Array, motion: Motion, sensor: Sensor, conversion: str = "conventional"
+) -> tuple[Array, Array]:
     """Position (lanes, dims) of each plot in the track frame, and its covariance."""
     z = np.atleast_2d(np.asarray(z, dtype=float))
     if isinstance(sensor, PositionSensor):
@@ -111,9 +122,9 @@ def locate(z: Array, motion: Motion, sensor: Sensor) -> tuple[Array, Array]:
     columns = [sensor.names.index(name) for name in needed]
     spreads = [_first(getattr(sensor, name.replace("_rad", "_deg"))) for name in needed]
     spreads[1:] = [np.radians(s) for s in spreads[1:]]
-    position, J = from_polar(z[:, columns])
-    variances = np.stack([np.broadcast_to(s, len(z)) for s in spreads], axis=-1) ** 2
-    cov = np.einsum("bij,bj,bkj->bik", J, variances, J)
+    sigma = np.stack([np.broadcast_to(s, len(z)) for s in spreads])
+    found = convert(conversion, z[:, columns].T, sigma)
+    position, cov = found.mean.T, np.moveaxis(found.cov, -1, 0)
     if sensor.pose is not None:
         turn = np.asarray(sensor.pose.rotation, dtype=float).reshape(-1, 3, 3)[0]
         turn = turn[: motion.dims, : motion.dims]
