@@ -174,7 +174,7 @@ class Converted:
 
     def _remembered(self, state: State, sight: Sight) -> State:
         d = len(sight.position)
-        point = mean_point(place(Given(sight.z, [0.0] * d)), d)
+        point = mean_point(place(Given(sight.z, [0.0] * d)))
         seen = sight.H[:, :d].T @ point
         return {"previous": select(sight.usable > 0.5, seen, state["previous"])}
 
