@@ -109,6 +109,7 @@ def _broken(segments: Array, inside: Array) -> Array:
     again = []
     for first, last in segments.tolist():
         out = inside[first:last] < 0.5
+        out[0] = False  # a start is no rejection, even of a filter that cannot start
         streak = out.copy()
         for i in range(1, PATIENCE):
             streak[:-i] &= out[i:]
