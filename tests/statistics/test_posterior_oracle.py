@@ -9,7 +9,6 @@ from scipy.optimize import least_squares
 
 from boresight.errors import UsageError
 from boresight.experiments.posterior import Flight, draw, exact_posterior
-from boresight.experiments.simulate import Truth
 from boresight.models.sensors import Radar
 
 FLIGHT = Flight(
@@ -80,15 +79,17 @@ def scaled(found, expected):
 
 @pytest.mark.parametrize("flat", ["polar", "cartesian"])
 def test_equals_quadrature_over_all_four_dimensions(flat):
-    short = replace(FLIGHT, sensor=Radar(range_m=900.0, azimuth_deg=5.0), scans=9, flat=flat)
+    short = replace(
+        FLIGHT, sensor=Radar(range_m=900.0, azimuth_deg=5.0), dt_s=4.0, scans=9, flat=flat
+    )
     _, z = draw(short, runs=2, seed=3)
-    exact = exact_posterior(short, z, at=[8])
+    exact = exact_posterior(short, z, at=[8], points=2**17)
     for run in range(2):
         mean, cov, *_ = by_quadrature(short, z[run], 20)
         coarse, *_ = by_quadrature(short, z[run], 16)
         assert np.max(np.abs(in_deviations(coarse - mean, cov))) < 1e-4  # it has converged
-        assert np.max(np.abs(in_deviations(exact.mean[run, 0] - mean, cov))) < 3e-3
-        assert scaled(exact.cov[run, 0], cov) < 6e-3
+        assert np.max(np.abs(in_deviations(exact.mean[run, 0] - mean, cov))) < 3e-4
+        assert scaled(exact.cov[run, 0], cov) < 6e-4
 
 
 def test_agrees_with_draws_from_the_prior():
@@ -97,12 +98,12 @@ def test_agrees_with_draws_from_the_prior():
     Late in a run, where the two signs of the transverse velocity are still both possible.
     """
     slow = replace(FLIGHT, dt_s=8.0, scans=8)
-    _, z = draw(slow, runs=3, seed=4)
+    _, z = draw(slow, runs=2, seed=4)
     ours, again = (exact_posterior(slow, z, at=[7], seed=seed) for seed in (0, 1))
     believer = np.random.default_rng(5)
     first = replace(slow, scans=1)
-    for run in range(3):
-        normal = believer.standard_normal((1_000_000, 4))
+    for run in range(2):
+        normal = believer.standard_normal((500_000, 4))
         r, azimuth = (z[run, 0] + normal[:, :2] * slow.sigma).T
         place = np.stack([r * np.cos(azimuth), r * np.sin(azimuth)], axis=-1)
         start = np.hstack([place, slow.speed_mps * normal[:, 2:]])
@@ -110,8 +111,8 @@ def test_agrees_with_draws_from_the_prior():
         log = [log_density(slow, z[run], p) - log_density(first, z[run, :1], p) for p in parts]
         state = moved(start, slow.time_s[-1])
         mean, cov, of_mean, of_cov = weighted(state, np.concatenate(log))
-        assert np.max(of_mean / np.sqrt(np.diag(cov))) < 0.03  # else the test would say nothing
-        # 42 comparisons; five standard errors, as weights have heavy tails: false alarm below 1e-3.
+        assert np.max(of_mean / np.sqrt(np.diag(cov))) < 0.04  # else the test would say nothing
+        # 28 comparisons; five standard errors, as weights have heavy tails: false alarm below 1e-3.
         assert np.all(np.abs(ours.mean[run, 0] - mean) < 5 * of_mean)
         assert np.all(np.abs(ours.cov[run, 0] - cov) < 5 * of_cov)
     assert np.max(np.abs(in_deviations(ours.mean - again.mean, ours.cov))) < 0.01
@@ -167,29 +168,34 @@ def nees(exact, truth, at):
 @pytest.mark.parametrize(("flat", "seed"), [("polar", 7), ("cartesian", 8)])
 def test_knows_its_errors_when_the_truth_is_drawn_from_its_prior(flat, seed):
     """E NEES is exactly 4, whatever the shape of the posterior; its spread is not chi-square's."""
-    at = [0, 19, 99]
+    at = [0, 99]
     flight = replace(FLIGHT, flat=flat)
-    truth, z = draw(flight, runs=300, seed=seed)
-    ratio = nees(exact_posterior(flight, z, at=at, points=512), truth, at)
+    truth, z = draw(flight, runs=200, seed=seed)
+    ratio = nees(exact_posterior(flight, z, at=at, points=256), truth, at)
     error = np.std(ratio, axis=0) / np.sqrt(len(ratio))
-    assert np.all(error < 0.08)  # else the test would say nothing
+    assert np.all(error < 0.1)  # else the test would say nothing
     assert np.all(np.abs(np.mean(ratio, axis=0) - 1) < 3.5 * error)  # false alarm 1.4e-3
 
 
-def test_draws_ranges_from_the_density_that_it_says():
+def test_draws_what_it_says():
     near = Flight(
         sensor=Radar(range_m=200.0, azimuth_deg=1.0),
         range_m=1000.0,
-        speed_mps=1.0,
-        scans=1,
+        speed_mps=3.0,
+        scans=2,
         flat="cartesian",
     )
     truth, z = draw(near, runs=20_000, seed=9)
-    r = np.hypot(*truth.states[:, 0, :2].T)
-    assert isinstance(truth, Truth)
-    assert np.all(z == z[0])
-    # E r = m + s²/m; the error of the mean is 200 / sqrt(20,000) = 1.4: false alarm 5e-4.
-    assert np.mean(r) == pytest.approx(1000 + 200**2 / 1000, abs=5)
+    assert np.all(z[:, 0] == z[0, 0])
+    states = truth.states
+    r = np.hypot(states[..., 0], states[..., 1])
+    # E r = m + s²/m; its error is 200 / sqrt(20,000) = 1.4. All false alarms below 1e-3.
+    assert np.mean(r[:, 0]) == pytest.approx(1000 + 200**2 / 1000, abs=5)
+    assert np.std(states[:, 0, 2:], axis=0) == pytest.approx([3.0, 3.0], rel=0.02)
+    assert np.allclose(states[:, 1, :2] - states[:, 0, :2], states[:, 0, 2:])
+    assert np.std(z[:, 1, 0] - r[:, 1]) == pytest.approx(200.0, rel=0.02)
+    bearing = np.arctan2(states[:, 1, 1], states[:, 1, 0])
+    assert np.std(z[:, 1, 1] - bearing) == pytest.approx(np.radians(1.0), rel=0.02)
 
 
 def test_turns_with_the_world_across_the_cut_of_the_azimuth():
