@@ -1,6 +1,7 @@
 """Polar and spherical plots as Cartesian positions with covariances, in seven ways.
 
-[lerro1993] D. Lerro and Y. Bar-Shalom, "Tracking with debiased consistent converted measurements".
+[lerro1993] D. Lerro and Y. Bar-Shalom, "Tracking with debiased consistent converted measurements
+versus EKF"; [mo1998] and [duan2004] for the unbiased ones.
 Paper: bordonaro (1) to (30); kashyap (3) and the appendix on CMKF-D.
 Differs from them: errata B2 to B5, B9 and K5; every variance is a sum of terms that are not
 negative, so nothing cancels; one formula serves the plane and space.
