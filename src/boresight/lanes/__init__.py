@@ -8,7 +8,7 @@ Nothing outside this folder knows how the code is made.
 """
 
 from boresight.lanes.blocks import Kernel, States, from_blocks, make_kernel, pack_states, to_blocks
-from boresight.lanes.dual import copysign, gradient, isnan, jacobian, select
+from boresight.lanes.dual import copysign, gradient, isnan, jacobian, reach, select
 from boresight.lanes.ir import BLOCK
 from boresight.lanes.program import Leaf, Matrix, Program, Rate, Scalar, Symmetric, Vector, trace
 from boresight.lanes.trace import Symbol
@@ -32,6 +32,7 @@ __all__ = [
     "jacobian",
     "make_kernel",
     "pack_states",
+    "reach",
     "select",
     "to_blocks",
     "trace",

@@ -257,3 +257,16 @@ def jacobian(f: Callable[[Array], Array], x: Array) -> tuple[Array, Array]:
     ys = list(f(_seed(x)))
     values = np.array([_value(y) for y in ys])
     return values, np.array([_row(y, x) for y in ys])
+
+
+def reach(f: Callable[[Array], Array], x: Array) -> list[int]:
+    """How many of the first elements of x hold all that each output of a formula depends on.
+
+    Known from the formula's structure, not from its values: an output that does not see a velocity
+    is the same formula wherever only velocities differ.
+
+    Args:
+        f: formula of one argument (n,) that returns (m,).
+        x: (n,) point, floats or symbols.
+    """
+    return [max(_slopes(y), default=-1) + 1 for y in f(_seed(x))]

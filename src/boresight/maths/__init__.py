@@ -1,6 +1,6 @@
 """Mathematics that knows no sensor. Everything formulas use runs on floats and on symbols."""
 
-from boresight.lanes import copysign, gradient, isnan, jacobian, select
+from boresight.lanes import copysign, gradient, isnan, jacobian, reach, select
 from boresight.maths.angles import wrap
 from boresight.maths.gaussian import Gaussian
 from boresight.maths.linalg import (
@@ -27,6 +27,7 @@ __all__ = [
     "lower_solve",
     "mirror",
     "missing",
+    "reach",
     "select",
     "solve",
     "upper_solve",
