@@ -46,14 +46,16 @@ class Broken:
 def traffic():
     from conftest import Sky
 
-    return pl.concat([Sky().aircraft(n) for n in range(20)])
+    late = Sky().aircraft(20, start_s=215.0, plots=45)
+    return pl.concat([*(Sky().aircraft(n) for n in range(20)), late])
 
 
 @pytest.fixture(scope="module")
 def compared(traffic):
     from conftest import SITE
 
-    told = traffic.with_columns(ground_speed_mps=pl.col("truth_speed"))
+    banking = pl.when(pl.col("address") == "F00003").then(20.0).otherwise(0.0)
+    told = traffic.with_columns(ground_speed_mps=pl.col("truth_speed"), roll_deg=banking)
     others = [lookup(name) for name in ("iekf", "mekf")]
     return track(told, filter=lookup("ekf"), compare=others, site=SITE, noise=KNOWN)
 
@@ -152,6 +154,7 @@ def test_rows_follow_from_the_scores(compared):
     for row in compared.filters:
         mine = compared.scores.filter(pl.col("filter") == row.filter)
         straight = mine.filter("straight")
+        assert 0.9 < len(straight) / len(mine) < 1
         assert row.scored == len(mine)
         assert row.loglik == pytest.approx(mine["loglik"].mean())
         assert row.nis_per_dof == pytest.approx(straight["nis"].sum() / straight["dof"].sum())
@@ -164,6 +167,34 @@ def test_rows_follow_from_the_scores(compared):
         assert row.gain.plots == len(pairs)
 
 
+def test_a_plot_is_scored_when_its_track_has_settled(compared):
+    late = compared.tracks.filter(pl.col("address") == "F00014")
+    mine = compared.scores.filter(pl.col("track") == late["track"][0])
+    assert mine["time_s"].min() == late["time_s"][8]
+    assert set(mine["filter"]) == {"ekf", "iekf", "mekf"}
+
+
+def test_what_only_one_filter_was_scored_on_is_in_no_difference(traffic, site):
+    case = prepare(traffic, site, None)
+    main, other = (flown(case, site, name, KNOWN) for name in ("main", "other"))
+    turned_away = np.arange(len(case.flights.time)) % 10 == 0
+    main.result.values["dof"][turned_away] = 0
+    main.result.values["loglik"][turned_away] = -1e6
+    (first, second), scores = side_by_side(case, [main, other], site)
+    assert first.scored == second.gain.plots < second.scored
+    assert second.gain.mean == 0
+    assert scores["gain"].null_count() == second.scored - first.scored
+
+
+def test_ground_speed_leaves_the_climb_out(traffic, site):
+    told = traffic.with_columns(ground_speed_mps=pl.col("truth_speed"))
+    case = prepare(told, site, None)
+    level, climbing = (flown(case, site, name, KNOWN) for name in ("level", "climbing"))
+    climbing.result.values["mean"][:, 5] = 1e3
+    (first, second), _ = side_by_side(case, [level, climbing], site)
+    assert second.speed_error_median_mps == first.speed_error_median_mps
+
+
 def test_the_first_filter_is_tracked_as_if_it_were_alone(compared, traffic, site):
     alone = track(traffic, filter=lookup("ekf"), site=site, noise=KNOWN)
     assert alone.tracks.equals(compared.tracks)
@@ -171,7 +202,7 @@ def test_the_first_filter_is_tracked_as_if_it_were_alone(compared, traffic, site
     assert [row.filter for row in compared.filters] == ["ekf", "iekf", "mekf"]
     assert alone.filters[0].loglik == compared.filters[0].loglik
     assert np.isnan(compared.filters[0].gain.mean)
-    assert compared.filters[0].updates + 20 == compared.used
+    assert compared.filters[0].updates + 21 == compared.used
 
 
 def test_noise_is_chosen_with_the_first_and_said(traffic, site):
