@@ -28,9 +28,10 @@ def convert(
         z: (..., 2) or (..., 3): range in m, azimuth from x towards y and, in space, elevation,
             both in radians.
         sigma: (2,) or (3,), or one for every plot: standard deviations in the same units.
-        prediction: where the target is thought to be, for "ducm", "cmkf-d-t" and "mmse": position
-            or state, mean (..., >= d), with cov, in the frame of the result. Or a `Given`, in the
-            sensor's own polar frame, such as `Given(z_before, sigma**2)`: the previous plot.
+        prediction: where the target is thought to be, for "ducm", "cmkf-d-t" and "mmse"; the others
+            look at the plot alone. Position or state, mean (..., >= d), with cov, in the frame of
+            the result; or a `Given` in the sensor's own polar frame, such as
+            `Given(z_before, sigma**2)`: the previous plot.
         pose: where the sensor stands and how it is turned; None for the frame's origin and axes.
 
     Returns:
