@@ -111,7 +111,8 @@ def _beside(result: "TrackingResult", width: int) -> "RenderableType":
     heads = ["filter", "all flight", "straight", "NIS/dof", "rejected", *more, "ns"]
     table = _table(heading, *heads)
     for each in result.filters:
-        optional = [figure(each.restarts), f"{figure(each.speed_error_95_mps, 3)} m/s"]
+        speed = f"{figure(each.speed_error_95_mps, 3)} m/s" if each.speeds else "–"
+        optional = [figure(each.restarts), speed]
         table.add_row(
             each.filter,
             _gain(each.gain),
