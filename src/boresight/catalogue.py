@@ -6,9 +6,10 @@ from importlib import resources
 from inspect import getdoc, getmodule
 
 from boresight.errors import UsageError
-from boresight.filters import ekf, kalman, mekf
+from boresight.filters import ekf, kalman, mekf, sigma, spherical
 from boresight.filters.converted import Converted
 from boresight.filters.method import Filter
+from boresight.filters.range_rate import RangeRate
 
 _FILTERS = {
     f.name: f
@@ -96,6 +97,41 @@ _FILTERS = {
             paper="bordonaro",
             predict=None,
             settings=(("conversion", "ducm"),),
+        ),
+        Filter(
+            name="range-rate",
+            formula=RangeRate,
+            summary="converted position with range rate, correlated noises",
+            paper="bordonaro",
+            predict=None,
+        ),
+        Filter(
+            name="ukf",
+            formula=sigma.unscented,
+            summary="unscented Kalman filter",
+            paper="julier2004",
+            predict=None,
+        ),
+        Filter(
+            name="ckf",
+            formula=sigma.cubature,
+            summary="cubature Kalman filter",
+            paper="arasaratnam2009",
+            predict=None,
+        ),
+        Filter(
+            name="iplf",
+            formula=sigma.posterior_linearisation,
+            summary="iterated posterior linearisation filter",
+            paper="garcia2015",
+            predict=None,
+        ),
+        Filter(
+            name="ckf-spherical",
+            formula=spherical.SphericalCubature,
+            summary="cubature Kalman filter with the position in range and angles",
+            paper="crouse2014",
+            predict=None,
         ),
     )
 }

@@ -101,11 +101,21 @@ _SPREAD = {"m": 200.0, "mps": 80.0, "mps2": 3.0, "radps": 0.02, "km": 1.0}
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """One filter with settings; `curved` filters take angles and ranges."""
+    """One filter with settings.
+
+    Attributes:
+        curved: it takes angles and ranges.
+        by_axes: its sigma points lie along the axes of the state, so only half a turn of the world
+            about the vertical turns its answer exactly.
+        own_state: what it keeps is curved in the motion's coordinates. So a linear world is none to
+            it, and a start is not told bit for bit; what it keeps is.
+    """
 
     name: str
     settings: dict[str, Any] = field(default_factory=dict)
     curved: bool = True
+    by_axes: bool = False
+    own_state: bool = False
 
     def __str__(self):
         return "-".join([self.name, *(str(v).replace(" ", "") for v in self.settings.values())])
@@ -144,6 +154,13 @@ FILTERS = (
     Entry("mmse"),
     Entry("ducm"),
     Entry("ducm", {"conditioning": "previous measurement"}),
+    Entry("range-rate"),
+    Entry("ukf", by_axes=True),
+    Entry("ukf", {"alpha": 0.5, "beta": 2.0, "kappa": 1.0}, by_axes=True),
+    Entry("ckf", by_axes=True),
+    Entry("iplf", by_axes=True),
+    Entry("iplf", {"iterations": 3}, by_axes=True),
+    Entry("ckf-spherical", by_axes=True, own_state=True),
 )
 CURVED = tuple(entry for entry in FILTERS if entry.curved)
 

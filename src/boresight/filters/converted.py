@@ -72,6 +72,27 @@ def pick(
     return np.array([z[i] for i in places]), [parts[i] for i in places]
 
 
+def by_plot(
+    prior: Gaussian, sight: Sight, taken: tuple[Array, list[Component]], name: str, given: Given
+) -> Posterior:
+    """Condition on a converted plot.
+
+    Args:
+        prior: predicted mean (n,), cov (n, n).
+        sight: the plot beside it.
+        taken: range and angles as measured, and their components.
+        name: of the conversion.
+        given: where the target is taken to be.
+    """
+
+    def convert_at(z: Array) -> Gaussian:
+        return convert(name, z, sight.sigma, given)
+
+    post = condition(prior, sight, read(sight, convert_at(sight.z)), *taken)
+    volume = log_volume(sight, lambda z: convert_at(z).mean)
+    return post._replace(loglik=post.loglik + volume)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Converted:
     """A converted-measurement Kalman filter.
@@ -143,7 +164,8 @@ class Converted:
         updates, taken = [], pick(polar, z, parts)
         if convertible(sensor):
             sight = sighted(prior, *taken, motion, sensor)
-            updates.append((polar, self._convert(prior, sight, state, taken)))
+            given = self._given(state, sight)
+            updates.append((polar, by_plot(prior, sight, taken, self.conversion, given)))
             kept = self._remembered(state, sight) if self._remembers(sensor) else {}
         elif polar:
             updates.append((polar, ekf.update(prior, *taken)))
@@ -152,18 +174,6 @@ class Converted:
             updates.append((others, ekf.update_sequential(latest, *pick(others, z, parts))))
         post, surprise = joined(len(parts), *updates)
         return {**post._asdict(), **kept}, surprise
-
-    def _convert(
-        self, prior: Gaussian, sight: Sight, state: State, taken: tuple[Array, list[Component]]
-    ) -> Posterior:
-        given = self._given(state, sight)
-
-        def convert_at(z: Array) -> Gaussian:
-            return convert(self.conversion, z, sight.sigma, given)
-
-        post = condition(prior, sight, read(sight, convert_at(sight.z)), *taken)
-        volume = log_volume(sight, lambda z: convert_at(z).mean)
-        return post._replace(loglik=post.loglik + volume)
 
     def _given(self, state: State, sight: Sight) -> Given:
         if "previous" not in state:
