@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from boresight.errors import UsageError
-from boresight.filters import ekf, mekf, posterior
+from boresight.filters import ekf, mekf, posterior, sigma, spherical
 from boresight.filters.recursion import OUTPUTS, leaves, run_recursion
 from boresight.lanes import (
     Matrix,
     Rate,
     Scalar,
-    Symmetric,
     Vector,
     from_blocks,
     make_kernel,
@@ -51,7 +50,7 @@ def program_for(recursion):
     full = {name: leaves(n, k)[name] for name in OUTPUTS} | {"cov": Matrix(n, n)}
     return trace(
         recursion.step,
-        state={"mean": Vector(n), "cov": Symmetric(n)},
+        state=recursion.layout,
         inputs=inputs,
         outputs={name: (leaf, Rate.EACH) for name, leaf in full.items()},
     )
@@ -72,8 +71,9 @@ def run(kernel, entry, world, lanes, *, of=None, threads=1, flown=None):
     """Outputs and final state of the first `lanes` flights, or of those in `of`."""
     flown = flown or flights(world, lanes)
     mean, cov, z = (array if of is None else array[of] for array in flown)
-    values = {name: value for name, (value, _) in entry.recursion(world).models().items()}
-    states = pack_states(kernel.program.state, {"mean": mean, "cov": cov})
+    recursion = entry.recursion(world)
+    values = {name: value for name, (value, _) in recursion.models().items()}
+    states = recursion.states(Gaussian(mean, cov), len(mean))
     inputs = values | {"z": z if kernel.rows else to_blocks(z), "dt": 2.0}
     final, out = kernel.run(states, inputs, STEPS, threads=threads)
     return final.rows, out
@@ -87,7 +87,7 @@ def test_every_back_end_is_the_formula_on_floats(goal, entry, world):
     recursion = entry.recursion(world)
     mean, cov, z = flights(world, lanes)
     for lane in range(lanes):
-        state = {"mean": mean[lane], "cov": cov[lane]}
+        state = recursion.begin(mean[lane], cov[lane])
         for t in range(STEPS):
             state, results = recursion.step(state, {"z": z[lane, t], "dt": 2.0})
             for name in OUTPUTS:
@@ -152,7 +152,7 @@ def test_looking_for_missing_numbers_costs_no_bit_where_none_is_missing(entry, m
     def always_there(component, measured, predicted):
         return 1.0, component.residual(measured, predicted)
 
-    for module in (posterior, ekf, mekf):
+    for module in (posterior, ekf, mekf, sigma, spherical):
         monkeypatch.setattr(module, "innovation", always_there)
     plain = program_for(recursion)
     assert plain.operations < masked.operations

@@ -100,7 +100,7 @@ class Affine(NamedTuple):
 
 
 def regress(formula: Formula, apart: Apart, mean: Array, L: Array, rule: Rule) -> Affine:
-    """Statistical linear regression of a formula on sigma points; garcia2015 (9) to (11).
+    """Statistical linear regression of a formula on sigma points (garcia2015, section II).
 
     Args:
         formula: of a state (n,), gives (k,).
@@ -168,7 +168,7 @@ def update(
     components: Sequence[Component],
     *,
     rule: Rule = CUBATURE,
-    iterations: int = 1,
+    iterations: int | None = 1,
 ) -> Posterior:
     """Condition on all components, regressed on points of the prior and then of the posterior.
 
@@ -181,11 +181,14 @@ def update(
         components: what the plot measures.
         rule: where the points lie.
         iterations: number of regressions; 1 is the unscented or cubature filter, more are
-            garcia2015, algorithm 1.
+            garcia2015. None: 5 of up to 5 states, 2 of more, where 5 of all
+            that may be measured do not fit a kernel.
 
     Returns:
         The last posterior; NIS and likelihood are those of the prediction.
     """
+    if iterations is None:
+        iterations = 5 if len(prior.mean) <= 5 else 2
     best = linearise(prior, prior, z, components, rule)
     first = last = kalman.condition(prior, *best)
     for _ in range(iterations - 1):
@@ -210,7 +213,7 @@ def linearise(
     """
     L, inverse = cholesky(at.cov)
     predicted, D, rest = regress(
-        lambda x: np.array([c.value(x) for c in components]),
+        partial(_values, components),
         lambda a, b: np.array([c.residual(u, v) for c, u, v in zip(components, a, b, strict=True)]),
         at.mean,
         L,
@@ -218,6 +221,7 @@ def linearise(
     )
     pairs = [innovation(c, v, p) for c, v, p in zip(components, z, predicted, strict=True)]
     seen, nu = (np.array(part) for part in zip(*pairs, strict=True))
+    nu = np.array([select(s < 0.5, 0.0, v) for s, v in zip(seen, nu, strict=True)])
     slopes = upper_solve(L, inverse, D.T).T
     H = np.array([select(s < 0.5, 0.0, h) for s, h in zip(seen, slopes, strict=True)])
     noise = rest + np.diag(np.array([c.sigma * c.sigma for c in components]))
@@ -229,6 +233,10 @@ def linearise(
         ]
     )
     return Linear(nu - H @ (prior.mean - at.mean), H, noise, seen)
+
+
+def _values(components: Sequence[Component], x: Array) -> Array:
+    return np.array([component.value(x) for component in components])
 
 
 def _posterior(prior: Gaussian, known: Linear) -> Gaussian:
@@ -246,7 +254,7 @@ def _volume(cov: Array) -> Any:
     return np.prod(elimination(cov))
 
 
-def _method(rule: Rule, iterations: int = 1) -> Updating:
+def _method(rule: Rule, iterations: int | None = 1) -> Updating:
     settings = (("iterations", iterations), ("rule", rule))
     return Updating(formula=update, settings=settings, moved=partial(predict, rule=rule))
 
@@ -271,12 +279,12 @@ def cubature() -> Updating:
 
 
 @cache
-def posterior_linearisation(*, iterations: int = 5) -> Updating:
+def posterior_linearisation(*, iterations: int | None = None) -> Updating:
     """Iterated posterior linearisation filter, with cubature points.
 
     Args:
-        iterations: 1 is the cubature Kalman filter.
+        iterations: as in `update`.
     """
-    if iterations < 1:
+    if iterations is not None and iterations < 1:
         raise UsageError(f"{iterations=} is less than one")
     return _method(CUBATURE, iterations)

@@ -1,6 +1,6 @@
 """Cubature Kalman filter with the position in range, azimuth and elevation; the rest Cartesian.
 
-[crouse2015] D. F. Crouse, "Basic Tracking Using Nonlinear 3D Monostatic and Bistatic Measurements",
+[crouse2014] D. F. Crouse, "Basic Tracking Using Nonlinear 3D Monostatic and Bistatic Measurements",
 on states in the coordinates of the measurement.
 
 Differs from it: a radar's range and angles are linear in this state, so they are used by an exact
@@ -38,7 +38,8 @@ from boresight.models.sensors import Pose, Radar, Sensor
 
 Array = Any
 _POLAR = ("range_m", "azimuth_rad", "elevation_rad")
-_NEAREST = 1e-3  # m: no target is nearer to its sensor
+_NEAREST = 2e-3  # m: no target is nearer to its sensor, or to the vertical axis
+_ANYTHING = np.pi**2 / 3.0  # rad², of an angle that is equally likely to be any
 
 
 def to_position(polar: Array, pose: Pose | None) -> Array:
@@ -57,8 +58,12 @@ def in_axes(p: Array, pose: Pose | None) -> Array:
 
 
 def from_position(p: Array, pose: Pose | None) -> Array:
-    """Range, azimuth and, in space, elevation (d,) of a position: the inverse of `to_position`."""
-    seen = in_axes(p, pose)
+    """Range, azimuth and, in space, elevation (d,) of a position: the inverse of `to_position`.
+
+    On the vertical axis, where angles have no slopes, a place beside it is taken.
+    """
+    seen = np.array(in_axes(p, pose))
+    seen[0] = seen[0] + select(seen[0] * seen[0] + seen[1] * seen[1] < _NEAREST**2, _NEAREST, 0.0)
     return np.array([FORMULAS[name](seen, seen) for name in _POLAR[: len(p)]])
 
 
@@ -82,19 +87,25 @@ def _on_branch(p: Array, polar: Array, turned: Any) -> Array:
 
 
 def _upright(state: Gaussian, dims: int) -> Gaussian:
-    """The same state with its range positive, its azimuth wrapped, its elevation within 90 deg."""
+    """The same state with a positive range and angles as they are commonly given.
+
+    Azimuth is wrapped and elevation within 90 degrees. No angle is less certain than one that may
+    be anything: right overhead, or at the sensor, Jacobians would say much more than that.
+    """
     mean, cov = np.array(state.mean), state.cov
-    mean[0] = select(mean[0] < _NEAREST, _NEAREST, mean[0])
+    sides: list[Any] = [1.0] * len(mean)
+    for i in range(1, dims):
+        vague = cov[i, i] > _ANYTHING
+        sides[i] = select(vague, np.sqrt(_ANYTHING / select(vague, cov[i, i], _ANYTHING)), 1.0)
     if dims == 3:
         el = wrap(mean[2])
         over = np.cos(el) < 0.0
         mean[1] = mean[1] + select(over, np.pi, 0.0)
         mean[2] = select(over, copysign(np.pi, el) - el, el)
-        side = np.array([1.0] * len(mean), dtype=object if cov.dtype == object else float)
-        side[2] = select(over, -1.0, 1.0)
-        cov = cov * np.outer(side, side)
+        sides[2] = sides[2] * select(over, -1.0, 1.0)
+    mean[0] = select(mean[0] < _NEAREST, _NEAREST, mean[0])
     mean[1] = wrap(mean[1])
-    return Gaussian(mean, cov)
+    return Gaussian(mean, cov * np.outer(np.array(sides), np.array(sides)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +137,7 @@ class SphericalCubature:
         pose, d = _pose(sensor), motion.dims
         polar, J = jacobian(lambda p: from_position(p, pose), start.mean[:d])
         mean = np.concatenate([polar, start.mean[d:]])
-        return _state(Gaussian(mean, _turned(start.cov, J)), pose)
+        return _state(_upright(Gaussian(mean, _turned(start.cov, J)), d), pose)
 
     def predict(self, state: State, motion: Motion, sensor: Sensor, dt: Any) -> State:
         """Through the motion's coordinates by cubature; the sensor may have moved."""
