@@ -33,6 +33,7 @@ _WHERE = {
     "models.sensors": ["Bearings", "Pose", "Radar"],
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
     "catalogue": ["cite"],
+    "filters.own_doppler": ["track_range_rate"],
     "experiments.scenario": ["Scenario"],
     "experiments.simulate": ["simulate"],
     "experiments.metrics": ["anees", "rmse"],

@@ -9,6 +9,7 @@ from boresight.experiments.metrics import rmse as rmse
 from boresight.experiments.reproduce import reproduce as reproduce
 from boresight.experiments.scenario import Scenario as Scenario
 from boresight.experiments.simulate import simulate as simulate
+from boresight.filters.own_doppler import track_range_rate as track_range_rate
 from boresight.interfaces.converting import convert as convert
 from boresight.interfaces.python import inspect as inspect
 from boresight.interfaces.python import read as read
