@@ -101,6 +101,11 @@ class Recursion:
         """What travels from step to step."""
         return self.method.layout(self.motion, self.sensor)
 
+    @property
+    def kept(self) -> dict[str, Leaf]:
+        """What travels from step to step, as outputs."""
+        return {f"kept_{name}": leaf for name, leaf in self.layout.items()}
+
     def models(self) -> dict[str, tuple[Any, Leaf]]:
         """Numbers of both models."""
         found = numbers(self.motion, "motion") | numbers(self.sensor, "sensor")
@@ -129,6 +134,7 @@ class Recursion:
         told = self.method.output(post, motion, sensor)
         results = surprise._asdict() | {"mean": told.mean, "cov": told.cov, "inside": inside}
         results["status"] = status_of(told.mean, told.cov)
+        results |= {f"kept_{name}": leaf for name, leaf in post.items()}
         results["summary"] = np.array([results[name] for name in SUMMARY])
         upper = told.cov[np.triu_indices(len(told.mean))]
         results["told"] = np.concatenate([results["summary"], told.mean, upper])
@@ -183,6 +189,7 @@ def _kernel(
 ) -> Kernel:
     recursion, rate = key.recursion, dict(rates)
     n, k = recursion.size
+    known = leaves(n, k) | recursion.kept
     shapes = {"z": Vector(k), "dt": Scalar()}
     shapes |= {name: leaf for name, (_, leaf) in recursion.models().items()}
     return make_kernel(
@@ -190,7 +197,7 @@ def _kernel(
             recursion.step,
             state=recursion.layout,
             inputs={name: (shape, rate[name]) for name, shape in shapes.items()},
-            outputs={name: (_full(leaves(n, k)[name]), when) for name, when in outputs},
+            outputs={name: (_full(known[name]), when) for name, when in outputs},
         )
     )
 
@@ -269,7 +276,8 @@ def run_recursion(
         z: plots (lanes, steps, k), SI units and radians, NaN where missing.
         dt: seconds before each step: a number, (1, steps), (lanes, 1) or (lanes, steps).
         start: Gaussian with mean (n,) or (lanes, n), or states of an earlier call.
-        outputs: which of `OUTPUTS` to write; the rest is not computed.
+        outputs: which of `OUTPUTS` to write; the rest is not computed. `kept_` and a name of the
+            filter's layout is what it keeps, such as `kept_mean`.
         last: write outputs after the last step only.
         threads: how many threads share the lanes.
     """
@@ -280,7 +288,7 @@ def run_recursion(
             f"plots have shape {z.shape}; (lanes, steps, {k}) is needed",
             why=f"the sensor measures {', '.join(recursion.sensor.names)}",
         )
-    unknown = sorted(set(outputs) - set(OUTPUTS))
+    unknown = sorted(set(outputs) - set(OUTPUTS) - set(recursion.kept))
     if unknown:
         raise UsageError(f"no output {unknown[0]!r}", next_step=f"use {', '.join(OUTPUTS)}")
     given = {"dt": (dt, Scalar())} | recursion.models()
