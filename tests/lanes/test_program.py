@@ -321,3 +321,26 @@ def test_gradients_of_elementary_functions():
     value, J = jacobian(f, np.array([x, y]))
     np.testing.assert_allclose(value, f(np.array([x, y])), rtol=1e-15)
     np.testing.assert_allclose(J, slopes, rtol=1e-14)
+
+
+def test_a_recorded_number_beside_a_dual_one_is_a_constant():
+    """d/db of the angle and the hypotenuse, the other leg being recorded and held."""
+
+    def step(state, inputs):
+        a, b = inputs["x"]
+        _, angle = gradient(lambda v: np.arctan2(a, v[0]), np.array([b]))
+        _, hypotenuse = gradient(lambda v: np.hypot(a, v[0]), np.array([b]))
+        return state, {"slopes": np.concatenate([angle, hypotenuse])}
+
+    program = trace(
+        step,
+        state={"none": Scalar()},
+        inputs={"x": (Vector(2), Rate.EACH)},
+        outputs={"slopes": (Vector(2), Rate.EACH)},
+    )
+    x = np.array([[[3.2, -1.7]]])
+    states = pack_states(program.state, {"none": np.zeros(1)})
+    _, results = make_kernel(program).run(states, {"x": x}, 1)
+    square = 3.2**2 + 1.7**2
+    expected = [-3.2 / square, -1.7 / np.sqrt(square)]
+    np.testing.assert_allclose(results["slopes"][0, 0], expected, rtol=1e-14)

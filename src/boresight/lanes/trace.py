@@ -217,8 +217,10 @@ class Symbol:
         """A real number is its own conjugate (NumPy's inner products ask)."""
         return self
 
-    def arctan2(self, x: Any) -> "Symbol":
+    def arctan2(self, x: Any) -> Any:
         """Angle of the point (x, self), radians in (-pi, pi]."""
+        if hasattr(x, "slopes"):  # beside a dual number this one is a constant
+            return type(x)(self, {}).arctan2(x)
         return self.graph.apply("arctan2", self, self._lifted(x, "arctan2"))
 
     def copysign(self, sign: Any) -> "Symbol":
@@ -227,7 +229,7 @@ class Symbol:
 
     def hypot(self, other: Any) -> Any:
         """Root of the sum of squares, unscaled: exact for magnitudes between 1e-150 and 1e150."""
-        other = self._lifted(other, "hypot")
+        other = other if hasattr(other, "slopes") else self._lifted(other, "hypot")
         return (self * self + other * other).sqrt()
 
     def __pow__(self, power: Any) -> Any:
