@@ -1,7 +1,7 @@
-"""Two formulas of later floors, here only to hold the compiler to its stop rule.
+"""A formula written by hand, here only to hold the compiler to its stop rule.
 
 DUCM converts a plot with a covariance taken at the prediction: few operations, `exp` and
-trigonometry. The UKF spreads thirteen points twice a step: many operations, two Cholesky factors.
+trigonometry.
 """
 
 from collections.abc import Mapping
@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from boresight.filters.kalman import predict
-from boresight.filters.posterior import innovation
 from boresight.lanes import Program, Rate, Scalar, Symmetric, Vector, trace
 from boresight.maths import Gaussian, cholesky, lower_solve, mirror, upper_solve
-from scenario import PLANAR, RADAR, SPATIAL
+from scenario import PLANAR
 
 Array = Any
 Step = tuple[dict[str, Array], dict[str, Array]]
@@ -50,49 +49,6 @@ def ducm(state: Mapping[str, Array], inputs: Mapping[str, Any]) -> Step:
     nu = np.array([scale * np.cos(z[1]), scale * np.sin(z[1])]) - position
     L, inverse = cholesky(mirror(H @ cov @ H.T + np.array([[R11, R12], [R12, R22]])))
     half = lower_solve(L, inverse, H @ cov)
-    mean = mean + upper_solve(L, inverse, half).T @ nu
-    return {"mean": mean, "cov": mirror(cov - half.T @ half)}, {"mean": mean}
-
-
-def _points(mean: Array, cov: Array, spread: float) -> Array:
-    """(2 n + 1, n) sigma points."""
-    steps = cholesky(cov)[0].T * spread
-    return np.array([mean, *(mean + d for d in steps), *(mean - d for d in steps)])
-
-
-def ukf(state: Mapping[str, Array], inputs: Mapping[str, Any]) -> Step:
-    """Constant velocity in space, range, azimuth and elevation; sigma points in both halves."""
-    n, kappa = 6, 1.0
-    spread = float(np.sqrt(n + kappa))
-    weights = np.array([kappa, *[0.5] * (2 * n)]) / (n + kappa)
-    moved = np.array(
-        [SPATIAL.move(p, inputs["dt"]) for p in _points(state["mean"], state["cov"], spread)]
-    )
-    mean = weights @ moved
-    away = moved - mean
-    cov = mirror((away.T * weights) @ away + SPATIAL.noise(inputs["dt"]))
-    points = _points(mean, cov, spread)
-    components = RADAR.components(SPATIAL)
-    centre = [component.value(points[0]) for component in components]
-    turns = np.array(
-        [
-            [h.residual(h.value(p), c) for h, c in zip(components, centre, strict=True)]
-            for p in points
-        ]
-    )
-    shift = weights @ turns
-    spreads, offsets = turns - shift, points - mean
-    noise = np.diag([inputs["range_m"], inputs["azimuth_rad"], inputs["elevation_rad"]])
-    S = mirror((spreads.T * weights) @ spreads + noise @ noise)
-    cross = (spreads.T * weights) @ offsets
-    nu = np.array(
-        [
-            innovation(h, value, c + d)[1]
-            for h, value, c, d in zip(components, inputs["z"], centre, shift, strict=True)
-        ]
-    )
-    L, inverse = cholesky(S)
-    half = lower_solve(L, inverse, cross)
     mean = mean + upper_solve(L, inverse, half).T @ nu
     return {"mean": mean, "cov": mirror(cov - half.T @ half)}, {"mean": mean}
 

@@ -19,7 +19,7 @@ from boresight.lanes import (
     Leaf,
     Program,
     Rate,
-    Symmetric,
+    States,
     Vector,
     make_kernel,
     pack_states,
@@ -36,19 +36,27 @@ RUNS, STEPS, ROUNDS = 1000, 500, 9
 LIMIT, AGREEMENT = 1.3, 1e-12
 
 
-def mekf() -> tuple[Program, dict[str, Any]]:
-    """The catalogue's sequential MEKF, six states, with the means of every step out."""
-    recursion = catalogue.lookup("mekf").recursion(SPATIAL, RADAR)
+def recorded(name: str) -> tuple[Program, dict[str, Any]]:
+    """A filter of the catalogue, six states, with the means of every step out, and its numbers."""
+    recursion = catalogue.lookup(name).recursion(SPATIAL, RADAR)
     models = recursion.models()
     n, k = recursion.size
     shapes = {"z": (Vector(k), Rate.EACH), "dt": (Leaf(), Rate.FIXED)}
     program = trace(
         recursion.step,
-        state={"mean": Vector(n), "cov": Symmetric(n)},
+        state=recursion.layout,
         inputs=shapes | {name: (leaf, Rate.FIXED) for name, (_, leaf) in models.items()},
         outputs={"mean": (Vector(n), Rate.EACH)},
     )
     return program, {name: value for name, (value, _) in models.items()}
+
+
+def started(program: Program, given: Scenario) -> States:
+    """Every run at the scenario's start."""
+    leaves = given.start._asdict()
+    return pack_states(
+        program.state, {name: np.broadcast_to(v, (RUNS, *v.shape)) for name, v in leaves.items()}
+    )
 
 
 def problems() -> dict[str, tuple[Program, dict[str, Any], Scenario]]:
@@ -57,9 +65,9 @@ def problems() -> dict[str, tuple[Program, dict[str, Any], Scenario]]:
     noises = {"range_m": 30.0, "azimuth_rad": np.radians(0.5), "elevation_rad": np.radians(0.5)}
     flat = {name: noises[name] for name in ("range_m", "azimuth_rad")}
     return {
-        "mekf": (*mekf(), space),
+        "mekf": (*recorded("mekf"), space),
         "ducm": (formulas.record(formulas.ducm, 4, 2), flat, planar(space)),
-        "ukf": (formulas.record(formulas.ukf, 6, 3), noises, space),
+        "ukf": (*recorded("ukf"), space),
     }
 
 
@@ -76,7 +84,7 @@ def rivals(kernel: Kernel) -> dict[str, Kernel]:
 
 def compare(program: Program, values: Mapping[str, Any], given: Scenario) -> dict[str, Any]:
     """Our kernel in both layouts against all of gcc's, and how far the results lie apart."""
-    states = pack_states(program.state, given.start._asdict())
+    states = started(program, given)
     rows = dict(values) | {"dt": DT, "z": given.z}
     blocks = rows | {"z": to_blocks(given.z)}
     ours = make_kernel(program, rows=False)
@@ -119,8 +127,8 @@ def verdict(times: Mapping[str, dict[str, float]], apart: Mapping[str, float]) -
 def layouts() -> dict[str, Any]:
     """What packing costs: one step of 1,000 tracks, and the public calls around the kernel."""
     space = straight(RUNS, STEPS)
-    program, values = mekf()
-    states = pack_states(program.state, space.start._asdict())
+    program, values = recorded("mekf")
+    states = started(program, space)
     one = dict(values) | {"dt": DT, "z": np.ascontiguousarray(space.z[:, :1])}
     blocked = one | {"z": to_blocks(one["z"])}
     rows, blocks = make_kernel(program, rows=True), make_kernel(program, rows=False)
