@@ -11,7 +11,7 @@ import numpy as np
 from boresight.errors import UsageError
 from boresight.experiments.scenario import paper
 
-_PAPERS = ("aditya",)
+_PAPERS = ("aditya", "bordonaro")
 SEED = 1
 
 

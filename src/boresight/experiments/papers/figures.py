@@ -36,6 +36,26 @@ def writing_into(folder: Path) -> Iterator[None]:
         ) from error
 
 
+def sheet(
+    rows: int, columns: int, title: str, size: tuple[float, float] = (4.5, 3.2)
+) -> tuple[Any, Array]:
+    """A figure and its axes (rows, columns), each of `size` inches."""
+    from matplotlib.figure import Figure
+
+    wide, high = max(columns * size[0], 6.5), rows * size[1] + 0.4
+    figure = Figure(figsize=(wide, high), layout="constrained")
+    figure.suptitle(title, fontsize="medium")
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def ratio_axis(place: Any) -> None:
+    """A logarithmic y axis whose numbers are read at a glance."""
+    place.set_yscale("log")
+    place.minorticks_off()
+    place.set_yticks([1, 2, 3, 5, 10, 20], labels=["1", "2", "3", "5", "10", "20"])
+    place.autoscale()
+
+
 def save(figure: Any, path: Path, columns: Mapping[str, Array]) -> list[str]:
     """Write a figure as PNG and its numbers as CSV.
 
