@@ -8,6 +8,7 @@ from inspect import getdoc, getmodule
 from boresight.errors import UsageError
 from boresight.filters import ekf, kalman, mekf, sigma, spherical
 from boresight.filters.converted import Converted
+from boresight.filters.line_of_sight import LineOfSight
 from boresight.filters.method import Filter
 from boresight.filters.range_rate import RangeRate
 
@@ -131,6 +132,13 @@ _FILTERS = {
             formula=spherical.SphericalCubature,
             summary="cubature Kalman filter with the position in range and angles",
             paper="crouse2014",
+            predict=None,
+        ),
+        Filter(
+            name="line-of-sight",
+            formula=LineOfSight,
+            summary="Gaussians in the frame of the line of sight, bent as flight is there",
+            paper="lineofsight",
             predict=None,
         ),
     )

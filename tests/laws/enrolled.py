@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pytest
 
 from boresight import catalogue
 from boresight.filters.posterior import Posterior
@@ -109,6 +110,7 @@ class Entry:
             about the vertical turns its answer exactly.
         own_state: what it keeps is curved in the motion's coordinates. So a linear world is none to
             it, and a start is not told bit for bit; what it keeps is.
+        straight: it follows straight flight only, and refuses other motions.
     """
 
     name: str
@@ -116,12 +118,15 @@ class Entry:
     curved: bool = True
     by_axes: bool = False
     own_state: bool = False
+    straight: bool = False
 
     def __str__(self):
         return "-".join([self.name, *(str(v).replace(" ", "") for v in self.settings.values())])
 
     def recursion(self, world):
         """Predict and update in `world`."""
+        if self.straight and isinstance(world.motion, CoordinatedTurn):
+            pytest.skip("follows straight flight only")
         chosen = catalogue.lookup(self.name).with_settings(**self.settings)
         return chosen.recursion(world.motion, world.sensor)
 
@@ -161,6 +166,8 @@ FILTERS = (
     Entry("iplf", by_axes=True),
     Entry("iplf", {"iterations": 3}, by_axes=True),
     Entry("ckf-spherical", by_axes=True, own_state=True),
+    Entry("line-of-sight", own_state=True, straight=True),
+    Entry("line-of-sight", {"told": "unbiased"}, own_state=True, straight=True),
 )
 CURVED = tuple(entry for entry in FILTERS if entry.curved)
 
