@@ -1,7 +1,4 @@
-"""Sigma points: the textbooks' sums and two packages' filters, moments, what costs nothing, limits.
-
-The last half is the filter that keeps range and angles: its frames, its branches, what it tells.
-"""
+"""Sigma points: the textbooks' sums, two packages' filters, moments, what costs nothing, frames."""
 
 from dataclasses import replace
 
@@ -12,14 +9,13 @@ from hypothesis import strategies as st
 
 from boresight import catalogue
 from boresight.errors import UsageError
-from boresight.filters import sigma, spherical
+from boresight.filters import sigma
 from boresight.filters.recursion import run_recursion
-from boresight.filters.start import one_plot
 from boresight.lanes import Rate, Symmetric, Vector, reach, trace
-from boresight.maths import Gaussian, wrap
+from boresight.maths import Gaussian
 from boresight.models.motion import ConstantVelocity, CoordinatedTurn
 from boresight.models.sensors import Pose, Radar
-from laws.enrolled import PLANAR, PLANE, POLAR, POLAR_WORLDS, SPACE, Entry, World, tilted, turned
+from laws.enrolled import PLANAR, PLANE, POLAR, SPACE, Entry, World, tilted, turned
 from oracles import filters as textbook
 from oracles import peers
 
@@ -276,46 +272,3 @@ def test_a_platform_that_moves_with_its_world_sees_the_same_track(name):
     there = flown(name, replace(POLAR, pose=as_one(moving)), plots, start)
     here = flown(name, replace(POLAR, pose=home), looked_at([home] * len(STEPS), PATH), BEFORE)
     close((there.mean - shift, there.cov, there.nis), (here.mean, here.cov, here.nis))
-
-
-KEEPS = spherical.SphericalCubature()
-
-
-@pytest.mark.parametrize("world", [World(SPACE, POLAR), World(PLANE, PLANAR)], ids=str)
-@given(seed=seeds)
-def test_a_start_from_one_plot_is_kept_as_that_plot(world, seed):
-    mean, _ = world.prior(seed)
-    z = world.plot(mean, seed)
-    start = one_plot(z[None], world.motion, world.sensor)
-    kept = KEEPS.begin(Gaussian(start.mean[0], start.cov[0]), world.motion, world.sensor)
-    d = world.motion.dims
-    z[1] = wrap(z[1])
-    np.testing.assert_allclose(kept["mean"][:d], z, rtol=1e-9, atol=1e-9)
-    sigmas = np.array([c.sigma for c in world.sensor.components(world.motion)])
-    scaled = kept["cov"][:d, :d] / np.outer(sigmas, sigmas)
-    np.testing.assert_allclose(scaled, np.eye(d), atol=1e-8)
-
-
-@pytest.mark.parametrize("world", POLAR_WORLDS, ids=str)
-@given(seed=seeds, el=st.floats(-1.57, 1.57), sd=st.floats(1e-4, 1.7))
-def test_no_time_changes_nothing_even_over_the_pole_and_through_the_sensor(world, seed, el, sd):
-    """Points reach beyond 90 degrees, beyond half a turn and behind the sensor."""
-    rng = np.random.default_rng(seed)
-    n, d = len(world.motion.names), world.motion.dims
-    mean = np.array([300.0, rng.uniform(-3.1, 3.1), el, *rng.normal(scale=50.0, size=n)])[:n]
-    mean[d:] = rng.normal(scale=50.0, size=n - d)
-    root = (
-        np.tril(rng.normal(size=(n, n)))
-        * np.array([100.0, *[0.3 * sd] * (d - 1)] + [9.0] * (n - d))[:, None]
-    )
-    cov = root @ root.T + np.diag([1e-4] * n)
-    cov[1:d, 1:d] /= max(1.0, cov[1:d, 1:d].diagonal().max() / 3.0)
-    if np.linalg.eigvalsh(cov)[0] <= 0.0:
-        return
-    pose = world.sensor.pose
-    state = {"mean": mean, "cov": cov}
-    if pose is not None:
-        state |= {"position_m": pose.position_m, "rotation": pose.rotation}
-    after = KEEPS.predict(state, world.motion, world.sensor, 0.0)
-    np.testing.assert_allclose(after["mean"], mean, rtol=1e-9, atol=1e-8)
-    np.testing.assert_allclose(after["cov"], cov, rtol=1e-7, atol=1e-7 * np.max(cov))

@@ -10,7 +10,9 @@ halves of a pair differ by is a slope, where they meet is curvature, so that for
 h(x) = mean + D u + rest with x = m + L u, and nothing cancels. Residuals of angles are wrapped
 relative to the centre, so a mean of angles is right on either side of 180 degrees. A motion that is
 linear is predicted by its matrix, which is what points would give. A missing component is one that
-the sensor does not have. The update is in Joseph's form.
+the sensor does not have. A posterior is regressed on only where that leaves less to noise. The
+update is in Joseph's form, which needs no square-root form beside it: plots a hundred million times
+sharper than the start leave every covariance positive.
 
 With s² = alpha² (n + kappa) the covariance of the rest is sum_j e_j e_j' / s² +
 (beta - alpha²) d d', where e_j are the midpoints of the pairs and d = sum_j e_j / s² is what
@@ -100,7 +102,7 @@ class Affine(NamedTuple):
 
 
 def regress(formula: Formula, apart: Apart, mean: Array, L: Array, rule: Rule) -> Affine:
-    """Statistical linear regression of a formula on sigma points (garcia2015, section II).
+    """Statistical linear regression of a formula on sigma points (garcia2015).
 
     Args:
         formula: of a state (n,), gives (k,).
@@ -180,9 +182,8 @@ def update(
         z: plot (k,), NaN where missing.
         components: what the plot measures.
         rule: where the points lie.
-        iterations: number of regressions; 1 is the unscented or cubature filter, more are
-            garcia2015. None: 5 of up to 5 states, 2 of more, where 5 of all
-            that may be measured do not fit a kernel.
+        iterations: number of regressions; 1 is the unscented or cubature filter. None: 5 of up to
+            5 states and 2 of more, where 5 of all that may be measured do not fit a kernel.
 
     Returns:
         The last posterior; NIS and likelihood are those of the prediction.
@@ -190,12 +191,12 @@ def update(
     if iterations is None:
         iterations = 5 if len(prior.mean) <= 5 else 2
     best = linearise(prior, prior, z, components, rule)
-    first = last = kalman.condition(prior, *best)
+    first = kalman.condition(prior, *best)
     for _ in range(iterations - 1):
         again = linearise(prior, _posterior(prior, best), z, components, rule)
         better = _volume(again.noise) < _volume(best.noise)
         best = Linear(*(select(better, a, b) for a, b in zip(again, best, strict=True)))
-        last = kalman.condition(prior, *best)
+    last = kalman.condition(prior, *best)
     return Posterior(last.mean, last.cov, *first[2:])
 
 
