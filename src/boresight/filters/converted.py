@@ -177,7 +177,7 @@ class Converted:
 
     def _given(self, state: State, sight: Sight) -> Given:
         if "previous" not in state:
-            return sight.known
+            return sight.given
         d = len(sight.position)
         before = polar_moments(sight.H[:, :d] @ state["previous"], np.zeros((d, d)))
         return before._replace(variances=[s * s for s in sight.sigma])

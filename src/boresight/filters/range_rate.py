@@ -136,7 +136,7 @@ def _product(
     sight = sighted(prior, *pick(split(parts, d)[0], z, parts), motion, sensor)
     measured = z[sensor.names.index(RATE)]
     x, _, cov = _relative(prior, motion, sensor)
-    given = rate_moments(x[:d], x[d:], cov)._replace(place=sight.known)
+    given = rate_moments(x[:d], x[d:], cov)._replace(place=sight.given)
     told = select(missing(measured), given.rate, measured)
     sigma, rho = sensor.range_rate_mps, sensor.range_rate_correlation  # type: ignore[attr-defined]
     found = convert_with_rate(

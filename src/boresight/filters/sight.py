@@ -8,9 +8,9 @@ range r, elevation p + e and d beside the predicted azimuth is off that point by
     along   r cos e - r            on average -r E e² / 2, with variance r² (E e²)² / 2
     across  -r sin p sin e sin d   on average 0, with variance r² sin² p E e² E sin² d
 
-to second order in e, which are taken off and added to the noise. (e^{2v} - 1) / 2, v the variance
-of d, stands for E sin² d: the same for small v, but without bound for a target overhead, of whose
-position an azimuth says nothing linear.
+to second order in e: the mean is added to the point, the variances to the noise. (e^{2v} - 1) / 2,
+v the variance of d, stands for E sin² d: the same for small v, but without bound for a target
+overhead, of whose position an azimuth says nothing linear.
 """
 
 from collections.abc import Callable, Sequence
@@ -53,12 +53,6 @@ class Sight(NamedTuple):
     axes: Array
     usable: Any
     raised: Any
-
-    @property
-    def known(self) -> Given:
-        """The prediction; an elevation that was not measured is taken for exact."""
-        spread = [*self.given.variances[:2], *(v * self.raised for v in self.given.variances[2:])]
-        return self.given._replace(variances=spread)
 
 
 class Linear(NamedTuple):
@@ -127,7 +121,7 @@ def read(sight: Sight, found: Gaussian) -> Linear:
     nu, R = B @ (found.mean - sight.position), B @ found.cov @ B.T
     if len(sight.position) == 3:
         mean, *variances = _unraised(sight)
-        nu = nu - np.array([mean, 0.0, 0.0])[: len(B)]
+        nu = nu + np.array([mean, 0.0, 0.0])[: len(B)]
         R = _kept(R + np.diag([*variances, 0.0][: len(B)]), sight.raised)
     H = np.array([row * there for row, there in zip(B @ sight.H, seen, strict=True)])
     return Linear(nu * np.array(seen), H, R, np.array(seen))
