@@ -180,8 +180,26 @@ def test_an_unknown_paper_is_answered_with_the_nearest():
 
 def test_all_is_every_paper():
     found = {claim["id"] for claim in reproduce("all", runs=5)["claims"]}
-    assert found == ROWS
-    assert paper_keys() == ("aditya",)
+    assert {row for row in found if row.startswith("AD-")} == ROWS
+    assert {row.split("-")[0] for row in found} == {"AD", "BO"}
+    assert paper_keys() == ("aditya", "bordonaro")
+
+
+@pytest.mark.parametrize("key", paper_keys())
+def test_every_assumption_can_be_named(key):
+    assert reproduce(key, runs=5, assume=dict(paper(key)["assumed"]))["claims"]
+
+
+def test_assumptions_are_checked_and_followed():
+    with pytest.raises(UsageError, match="did you mean 'scans_tried'"):
+        reproduce("aditya", runs=5, assume={"scan_tried": [10]})
+    with pytest.raises(UsageError, match="scans_tried=10 cannot stand"):
+        reproduce("aditya", runs=5, assume={"scans_tried": 10})
+    changed = reproduce("aditya", runs=5, assume={"scans": 20, "scans_tried": [20, 40]})
+    rows = {claim["id"]: claim for claim in changed["claims"]}
+    assert sorted(name.split(", ")[-1] for name in rows["AD-C1"]["band"]) == sorted(
+        2 * ["20 steps", "40 steps"]
+    )
 
 
 def test_printed_results_stand_in_the_papers_table_only():

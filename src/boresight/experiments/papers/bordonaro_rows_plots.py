@@ -22,7 +22,7 @@ _RARE = 0.001  # chance of calling an unbiased conversion biased
 
 def figure_1(study: Study) -> Claim:
     """(2) through a pose: the drawing has no numbers, its equation has."""
-    turn, offset, seen = 0.7, np.array([300.0, -200.0]), np.array([5000.0, 1000.0])
+    turn, offset, seen = 0.7, np.array([31.0, -17.0]), np.array([42.0, 9.0])
     c, s = np.cos(turn), np.sin(turn)
     reference = np.array([[c, -s], [s, c]]) @ seen + offset  # (2)
     rows = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -154,7 +154,7 @@ def figure_5(study: Study) -> Claim:
         ours={name.upper(): float(values[at, 0]) for name, values in study.batches[r].items()},
         verdict=of_points(smaller, ~smaller) if len(smaller) else "in band",
         assumption=f"bias, ft, at {r:g} ft and {sigmas[at]:g}°, of one batch, as printed, and so "
-        f"with its chance error; at {len(smaller)} of {clear.size} points UCM's is more than chance, "
-        f"and MUCM's smaller at {int(np.sum(smaller))} of these; DUCM is conditioned on the true "
+        f"with its chance error; UCM's is more than that at {len(smaller)} of {clear.size} points, "
+        f"MUCM's smaller at {int(np.sum(smaller))} of these; DUCM is conditioned on the true "
         f"place; {reasons(study, 'batch_sigma_bearing_deg')}",
     )
