@@ -4,8 +4,7 @@ The state is (range, azimuth, elevation; velocity along them), and what a motion
 The frame's axes are the directions in which range, azimuth and elevation grow.
 """
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,41 +72,44 @@ def move(part: Gaussian, dt: Any, noise: Array, shift: Shift | None = None) -> G
     mean, P = part
     still = mean * 0.0
     unsure = dt * dt * P[4, 4] + mean[0] * mean[0] * P[2, 2] + noise[0, 0]
-
-    def fly(state: Array) -> Array:
-        return _fly(state, dt, still, unsure)
-
-    _, J = jacobian(fly, mean)
+    _, J = jacobian(lambda state: _fly(state, dt, still, unsure), mean)
     _, E = jacobian(lambda disturbance: _fly(mean, dt, disturbance, unsure), still)
-    mean = _fly(mean, dt, still, still[0]) + _second_order(fly, part)
-    moved = Gaussian(mean, mirror(J @ P @ J.T + E @ noise @ E.T))
+    moved = _fly(mean, dt, still, still[0]) + _outwards(part, dt)
+    cov = mirror(J @ P @ J.T + E @ noise @ E.T)
     if shift is None:
-        return moved
+        return Gaussian(moved, cov)
 
     def elsewhere(state: Array) -> Array:
         p, v, rest = np.split(leave(state), [3, 6])
         p, v = shift.turn @ p + shift.away[:3], shift.turn @ v + shift.away[3:]
         return enter(np.concatenate([p, v, rest]))
 
-    mean, J = jacobian(elsewhere, moved.mean)
-    mean = mean + _second_order(elsewhere, moved)
-    return Gaussian(mean, mirror(J @ moved.cov @ J.T))
+    mean, J = jacobian(elsewhere, moved)
+    return Gaussian(mean, mirror(J @ cov @ J.T))
 
 
-def _fly(state: Array, dt: Any, disturbance: Array, unsure: Any) -> Array:
-    """Straight flight from one line of sight to the next; at dt = 0 nothing is rounded.
+class _Course(NamedTuple):
+    """Where straight flight leads: range, changes of both angles, axes (3, 3) in the old ones."""
+
+    distance: Any
+    azimuth: Any
+    elevation: Any
+    axes: Array
+
+
+def _course(state: Array, dt: Any, disturbance: Array, unsure: Any) -> _Course:
+    """From one line of sight to the next; at dt = 0 nothing is rounded.
 
     Args:
         state: (n,).
         dt: s.
-        disturbance: (n,) of place and velocity, along the axes of the frame before, and the rest.
+        disturbance: (3, ...) of the place, along the axes of the frame before.
         unsure: square of the least distance from the vertical axis: for gradients, which grow
             without bound beside it.
     """
-    r, az, el, vr, va, ve = state[:6]
+    r, _, el, *velocity = state[:6]
     ce, se = np.cos(el), np.sin(el)
-    velocity = np.array([vr, va, ve]) + disturbance[3:6]
-    X, Y, Z = np.array([r + dt * vr, dt * va, dt * ve]) + disturbance[:3]
+    X, Y, Z = np.array([r, 0.0, 0.0]) + dt * np.array(velocity) + disturbance[:3]
     ahead, side = X * ce - Z * se, Y  # on the ground: towards the azimuth before, and beside it
     square = ahead * ahead + side * side
     over = square < NEAR_M2
@@ -118,35 +120,46 @@ def _fly(state: Array, dt: Any, disturbance: Array, unsure: Any) -> Array:
     # ground - ahead, which must not cancel
     behind = ahead < 0.0
     excess = select(behind, ground - ahead, side * side / select(behind, 1.0, ground + ahead))
-    distance = np.sqrt(X * X + Y * Y + Z * Z)
-    distance = select(distance < 1e-3, 1e-3, distance)
-    radial = np.array([X, Y, Z]) / distance
-    c, s = ahead / ground, side / ground
-    sideways = np.array([-s * ce, c, s * se])
-    upwards = np.array(
-        [
-            radial[1] * sideways[2] - radial[2] * sideways[1],
-            radial[2] * sideways[0] - radial[0] * sideways[2],
-            radial[0] * sideways[1] - radial[1] * sideways[0],
-        ]
-    )
-    angles = [az + np.arctan2(s, c), el + np.arctan2(Z - se * excess, X + ce * excess)]
-    seen = [axis @ velocity for axis in (radial, sideways, upwards)]
-    return np.array([distance, *angles, *seen, *(state[6:] + disturbance[6:])])
+    square = X * X + Y * Y + Z * Z
+    distance = np.sqrt(select(square < NEAR_M2, NEAR_M2, square))
+    (x, y, z), c, s = np.array([X, Y, Z]) / distance, ahead / ground, side / ground
+    sideways = [-s * ce, c, s * se]
+    upwards = [y * s * se - z * c, -z * s * ce - x * s * se, x * c + y * s * ce]
+    axes = np.array([[x, y, z], sideways, upwards])
+    raised = np.arctan2(Z - se * excess, X + ce * excess)
+    return _Course(distance, np.arctan2(s, c), raised, axes)
 
 
-def _second_order(f: Callable[[Array], Array], at: Gaussian) -> Array:
-    """What the curvature of f adds to its mean: half the trace of its Hessians times cov."""
-    m, n = len(f(at.mean)), len(at.mean)
-    _, H = jacobian(lambda x: jacobian(f, x)[1].reshape(-1), at.mean)
-    H = H.reshape(m, n, n)
-    total = [at.mean[0] * 0.0] * m
-    for k in range(m):
-        for i in range(n):
-            total[k] = total[k] + 0.5 * H[k, i, i] * at.cov[i, i]
-            for j in range(i):
-                total[k] = total[k] + H[k, i, j] * at.cov[i, j]
-    return np.array(total)
+def _fly(state: Array, dt: Any, disturbance: Array, unsure: Any) -> Array:
+    """The state (n,) dt seconds later; as `_course`, `disturbance` (n,) of all."""
+    course = _course(state, dt, disturbance, unsure)
+    seen = course.axes @ (state[3:6] + disturbance[3:6])
+    place = [course.distance, state[1] + course.azimuth, state[2] + course.elevation]
+    return np.array([*place, *seen, *(state[6:] + disturbance[6:])])
+
+
+def _outwards(part: Gaussian, dt: Any) -> Array:
+    """What second order adds to the mean of range and velocities (n,): the centripetal term.
+
+    That of the angles is left out: it is about their variance times their standard deviation.
+    """
+    mean, P = part
+    course = _course(mean, dt, mean * 0.0, mean[0] * 0.0)
+    axes, zero = course.axes, np.zeros((3, len(mean) - 6))
+    rates = np.hstack([np.zeros((3, 3)), axes, zero])  # of (x, y, z) of the frame after, (3, n)
+    places = np.hstack([axes[:, :1], np.zeros((3, 2)), dt * axes, zero])
+    _, y, z = places @ P @ places.T
+    cross = places[1:] @ P @ rates.T
+    spread = y[1] + z[2]
+    square = course.distance * course.distance + spread
+    lever = 1.0 / np.sqrt(square)
+    a, b, c = axes @ mean[3:6]
+    side, up = -y[0] / (square + y[1]), -z[0] / (square + z[2])
+    half = 0.5 / square
+    along = (cross[0, 1] + cross[1, 2]) * lever + b * side + c * up - a * spread * half
+    across = -cross[0, 0] * lever - a * side - (b * y[1] + c * y[2]) * half
+    upward = -cross[1, 0] * lever - a * up - (c * z[2] + b * y[2]) * half
+    return np.array([0.5 * spread * lever, 0.0, 0.0, along, across, upward, *zero[0]])
 
 
 def condition(part: Gaussian, h: Array, nu: Any, noise: Any, there: Any) -> tuple[Gaussian, Any]:
@@ -182,7 +195,7 @@ def unbiased(part: Gaussian) -> Array:
 def _angles_first(P: Array) -> tuple[list[Array], Array]:
     """Columns (n,) of a root of what varies with the angles, and what is left without them."""
     columns = []
-    for i in (1, 2):
+    for i in (2, 1):
         column = P[:, i] / np.sqrt(P[i, i] + NOTHING)
         columns.append(column)
         P = mirror(P - np.outer(column, column))
