@@ -133,7 +133,10 @@ class SphericalCubature:
         return gaussian_layout(motion) | pose
 
     def begin(self, start: Gaussian, motion: Motion, sensor: Sensor) -> State:
-        """By the Jacobian at the mean: the inverse of a start from one plot."""
+        """By the Jacobian at the mean, from where the sensor is at the first step.
+
+        The inverse of a start from one plot.
+        """
         pose, d = _pose(sensor), motion.dims
         polar, J = jacobian(lambda p: from_position(p, pose), start.mean[:d])
         mean = np.concatenate([polar, start.mean[d:]])
@@ -184,7 +187,11 @@ class SphericalCubature:
         return _state(_upright(latest, d), pose), Surprise(*totals, *each)
 
     def output(self, state: State, motion: Motion, sensor: Sensor) -> Gaussian:
-        """Mean and covariance in the motion's coordinates: exact to second order, and positive."""
+        """Mean and covariance in the motion's coordinates, by points of the position.
+
+        The rule is exact for squares of deviations, and positive; what products of two of them add
+        to a covariance is left out.
+        """
         pose, d = _pose(sensor), motion.dims
         second = sigma.Rule(1.0, 1.0, 2.0 - d)
         mean, cov = state["mean"], state["cov"]
