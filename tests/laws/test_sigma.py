@@ -78,6 +78,8 @@ def test_posterior_linearisation_is_the_textbook(world, iterations, seed):
         mean, cov, z, R, lambda x: textbook.polar(x[: world.motion.dims]), iterations
     )
     close((post.mean, post.cov), expected, 1e-7)  # the textbook inverts every covariance
+    once = Entry("ckf").update(world, mean, cov, z)
+    close((post.nis, post.loglik), (once.nis, once.loglik))  # those of the prediction
 
 
 @pytest.mark.parametrize("name", ["ukf", "ckf", "iplf"])
