@@ -126,7 +126,7 @@ class LineOfSight:
         nus: list[Any] = [None] * len(components)
         variances: list[Any] = [None] * len(components)
         views = [View(each, motion, sensor, platform) for each in components]
-        for i in sorted(range(len(z)), key=lambda i: views[i].index is None):  # linear ones first
+        for i in sorted(range(len(z)), key=lambda i: views[i].turn):
             there = select(missing(z[i]), 0.0, 1.0)
             told = [views[i].condition(part, z[i], there) for part in parts]
             parts = [part for part, _, _ in told]
@@ -186,6 +186,11 @@ class View:
             states.append("range_rate_mps")  # else it has a share of the range in it
         name = self.component.name
         return states.index(name) if name in states else None
+
+    @property
+    def turn(self) -> int:
+        """When it is used: angles first, for what they tell of the way across unbends the range."""
+        return 2 if self.index is None else int(not self.component.is_angle)
 
     def condition(self, part: Any, measured: Any, there: Any) -> tuple[Any, Any, Any]:
         """The part, its innovation, and the variance of that."""

@@ -189,7 +189,7 @@ def condition(part: Part, h: Array, nu: Any, noise: Any, there: Any) -> tuple[Pa
     mean, P, _ = part
     bend = _spread(part.bend)
     cross, seen = P @ h, h @ bend
-    s = h @ cross + noise
+    s = h @ cross + noise + 2.0 * (seen * P[_T, _T]) * (seen * P[_T, _T])
     gain = cross * (there / s)
     cov = mirror(P - np.outer(gain, cross))
     across = cross - P[:, _T] * (cross[_T] / (P[_T, _T] + NOTHING))
