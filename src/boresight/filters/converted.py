@@ -5,8 +5,8 @@ Paper: bordonaro (24) to (31), sections 2.4 and 3; kashyap's appendix.
 Differs from them: any conversion, in the plane and in space, from any pose (errata B10, B11, and
 those of `models.conversions`); a filter starts from its own conversion given the plot, DUCM from
 that of UCM (erratum B9); an elevation that is not measured is the predicted one; a plot without
-range or azimuth updates the block EKF instead; heights and range rates follow, one by one, as in
-the sequential EKF.
+range or azimuth updates the block EKF instead; heights come before and range rates after, as in the
+sequential EKF.
 
 What the conversions do to a filter: conventional, ucm, mucm and cmkf-d-m take the noise from the
 plot, so noise and gain are correlated and the estimate is biased along the line of sight; mmse and
@@ -42,27 +42,35 @@ from boresight.models.polar import Given, mean_point, place, polar_moments
 from boresight.models.sensors import Sensor
 
 Array = Any
-POLAR = ("range_m", "azimuth_rad", "elevation_rad")
+POLAR, RATE = ("range_m", "azimuth_rad", "elevation_rad"), "range_rate_mps"
 Conditioning = Literal["prediction", "previous measurement"]
 
 
-def joined(size: int, *updates: tuple[Sequence[int], Posterior]) -> tuple[Gaussian, Surprise]:
-    """Updates one after the other as one: each with the places of its components in the plot."""
+def joined(size: int, *updates: tuple[Sequence[int], Posterior | Surprise]) -> Surprise:
+    """Surprises one after the other as one, each with the places of its components in the plot."""
     nu, variance = [0.0] * size, [0.0] * size
-    for places, post in updates:
-        for i, a, b in zip(places, post.innovation, post.variance, strict=True):
+    for places, found in updates:
+        for i, a, b in zip(places, found.innovation, found.variance, strict=True):
             nu[i], variance[i] = a, b
-    nis, dof, loglik = (sum(post[i] for _, post in updates) for i in (2, 3, 4))
-    last = updates[-1][1]
-    told = Surprise(nis, dof, loglik, np.array(nu), np.array(variance))
-    return Gaussian(last.mean, last.cov), told
+    founds = [found for _, found in updates]
+    return Surprise(
+        nis=sum(found.nis for found in founds),
+        dof=sum(found.dof for found in founds),
+        loglik=sum(found.loglik for found in founds),
+        innovation=np.array(nu),
+        variance=np.array(variance),
+    )
 
 
-def split(parts: Sequence[Component], dims: int) -> tuple[list[int], list[int]]:
-    """Where range and angles stand in a plot, in the order of `POLAR`, and where the rest."""
+def split(parts: Sequence[Component], dims: int) -> tuple[list[int], list[int], list[int]]:
+    """Where in a plot coordinates and heights stand, range and angles (as in `POLAR`), and rates.
+
+    That is the order of use: a radar without elevation needs the height before it converts.
+    """
     names = [part.name for part in parts]
     polar = [names.index(name) for name in POLAR[:dims] if name in names]
-    return polar, [i for i in range(len(names)) if i not in polar]
+    rates = [i for i, name in enumerate(names) if name == RATE]
+    return [i for i in range(len(names)) if i not in (*polar, *rates)], polar, rates
 
 
 def pick(
@@ -156,24 +164,26 @@ class Converted:
     def update(
         self, state: State, z: Array, motion: Motion, sensor: Sensor
     ) -> tuple[State, Surprise]:
-        """By the converted plot, then by what else was measured."""
-        prior = Gaussian(state["mean"], state["cov"])
+        """By heights, by the converted plot, by range rate: those that the sensor has."""
+        at, kept = Gaussian(state["mean"], state["cov"]), state
         z, parts = sensor.independent(z, motion)
-        polar, others = split(parts, motion.dims)
-        kept: State = {}
-        updates, taken = [], pick(polar, z, parts)
-        if convertible(sensor):
-            sight = sighted(prior, *taken, motion, sensor)
-            given = self._given(state, sight)
-            updates.append((polar, by_plot(prior, sight, taken, self.conversion, given)))
-            kept = self._remembered(state, sight) if self._remembers(sensor) else {}
-        elif polar:
-            updates.append((polar, ekf.update(prior, *taken)))
-        if others or not updates:
-            latest = Gaussian(*updates[-1][1][:2]) if updates else prior
-            updates.append((others, ekf.update_sequential(latest, *pick(others, z, parts))))
-        post, surprise = joined(len(parts), *updates)
-        return {**post._asdict(), **kept}, surprise
+        heights, polar, rates = split(parts, motion.dims)
+        updates = []
+        for places in (heights, polar, rates):
+            if places:
+                taken = pick(places, z, parts)
+                if places is not polar:
+                    post = ekf.update_sequential(at, *taken)
+                elif not convertible(sensor):
+                    post = ekf.update(at, *taken)
+                else:
+                    sight = sighted(at, *taken, motion, sensor)
+                    given = self._given(state, sight)
+                    post = by_plot(at, sight, taken, self.conversion, given)
+                    kept = self._remembered(state, sight)
+                at = Gaussian(post.mean, post.cov)
+                updates.append((places, post))
+        return {**kept, **at._asdict()}, joined(len(parts), *updates)
 
     def _given(self, state: State, sight: Sight) -> Given:
         if "previous" not in state:
@@ -183,6 +193,8 @@ class Converted:
         return before._replace(variances=[s * s for s in sight.sigma])
 
     def _remembered(self, state: State, sight: Sight) -> State:
+        if "previous" not in state:
+            return state
         d = len(sight.position)
         point = mean_point(place(Given(sight.z, [0.0] * d)))
         seen = sight.H[:, :d].T @ point

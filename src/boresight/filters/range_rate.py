@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boresight.filters.converted import Converted, joined, pick, split
+from boresight.filters.converted import RATE, Converted, joined, pick, split
 from boresight.filters.posterior import Posterior, innovation, tally
 from boresight.filters.sight import Sight, convertible, read, sighted
 from boresight.filters.steps import State, Surprise
@@ -32,7 +32,6 @@ from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
 
 Array = Any
-RATE = "range_rate_mps"
 _DUCM = Converted(conversion="ducm")
 _NEAREST = 1e-3  # m: no range is divided by that is shorter
 
@@ -74,23 +73,30 @@ class RangeRate:
     def update(
         self, state: State, z: Array, motion: Motion, sensor: Sensor
     ) -> tuple[State, Surprise]:
-        """By all else that was measured, then by range rate."""
-        if RATE not in sensor.names:
+        """By heights, by the converted plot, by range rate: those that the sensor has."""
+        parts = sensor.components(motion)
+        heights, polar, rates = split(parts, motion.dims)
+        if not rates:
             return _DUCM.update(state, z, motion, sensor)
-        i, prior = sensor.names.index(RATE), Gaussian(state["mean"], state["cov"])
-        there, others = select(missing(z[i]), 0.0, 1.0), np.array([*z[:i], np.nan, *z[i + 1 :]])
-        state, first = _DUCM.update(state, others, motion, sensor)
+        surprises = []
+        for places in (heights, polar):
+            prior = Gaussian(state["mean"], state["cov"])
+            alone = np.array([value if i in places else np.nan for i, value in enumerate(z)])
+            if places:
+                state, found = _DUCM.update(state, alone, motion, sensor)
+                told = found._replace(
+                    innovation=found.innovation[places], variance=found.variance[places]
+                )
+                surprises.append((places, told))
         at = Gaussian(state["mean"], state["cov"])
-        rate = _alone(at, *(pair[i] for pair in sensor.independent(z, motion)))
+        rate = _alone(at, *(pair[rates[0]] for pair in sensor.independent(z, motion)))
         if convertible(sensor):
             sight, product = _product(prior, at, z, motion, sensor)
             both = zip(product, rate, strict=True)
             rate = Rate(*(select(sight.usable > 0.5, a, b) for a, b in both))
-        places = range(len(z))
-        post, surprise = joined(
-            len(z), (places, Posterior(*at, *first)), ([i], self._use(at, rate, there))
-        )
-        return post._asdict(), surprise
+        post = self._use(at, rate, select(missing(z[rates[0]]), 0.0, 1.0))
+        surprise = joined(len(parts), *surprises, (rates, post))
+        return {"mean": post.mean, "cov": post.cov}, surprise
 
     def _use(self, prior: Gaussian, rate: Rate, there: Any) -> Posterior:
         """A scalar update that leaves the measured quantity uncertain by its curvature."""
@@ -133,7 +139,7 @@ def _product(
 ) -> tuple[Sight, Rate]:
     """The product over the measured range, less what it shares with the converted position."""
     d, parts = motion.dims, sensor.components(motion)
-    sight = sighted(prior, *pick(split(parts, d)[0], z, parts), motion, sensor)
+    sight = sighted(prior, *pick(split(parts, d)[1], z, parts), motion, sensor)
     measured = z[sensor.names.index(RATE)]
     x, _, cov = _relative(prior, motion, sensor)
     given = rate_moments(x[:d], x[d:], cov)._replace(place=sight.given)

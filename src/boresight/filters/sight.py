@@ -5,12 +5,13 @@ y; in space along the predicted line of sight, across it on the ground, and upwa
 elevation is converted at the predicted elevation p, and used along and across only. A target at
 range r, elevation p + e and d beside the predicted azimuth is off that point by
 
-    along   r cos e - r            on average -r E e² / 2, with variance r² (E e²)² / 2
-    across  -r sin p sin e sin d   on average 0, with variance r² sin² p E e² E sin² d
+    along   r cos e - r            square on average r² E e⁴ / 4
+    across  -r sin p sin e sin d   square on average r² sin² p E e² E sin² d
 
-to second order in e: the mean is added to the point, the variances to the noise. (e^{2v} - 1) / 2,
-v the variance of d, stands for E sin² d: the same for small v, but without bound for a target
-overhead, of whose position an azimuth says nothing linear.
+to second order in e, which are added to the noise. The mean of the first is not taken off: an
+elevation that stays unknown errs alike at every scan, and its mean would walk the track away from
+its plots. (e^{2v} - 1) / 2, v the variance of d, stands for E sin² d: the same for small v, but
+without bound for a target overhead, of whose position an azimuth says nothing linear.
 """
 
 from collections.abc import Callable, Sequence
@@ -120,19 +121,17 @@ def read(sight: Sight, found: Gaussian) -> Linear:
     seen = seen[: len(B)]
     nu, R = B @ (found.mean - sight.position), B @ found.cov @ B.T
     if len(sight.position) == 3:
-        mean, *variances = _unraised(sight)
-        nu = nu + np.array([mean, 0.0, 0.0])[: len(B)]
-        R = _kept(R + np.diag([*variances, 0.0][: len(B)]), sight.raised)
+        R = _kept(R + np.diag([*_unraised(sight), 0.0][: len(B)]), sight.raised)
     H = np.array([row * there for row, there in zip(B @ sight.H, seen, strict=True)])
     return Linear(nu * np.array(seen), H, R, np.array(seen))
 
 
-def _unraised(sight: Sight) -> tuple[Any, Any, Any]:
-    """Mean along, variances along and across, of what an elevation that was not measured does."""
+def _unraised(sight: Sight) -> tuple[Any, Any]:
+    """Mean squares, along and across, of what an elevation that was not measured does."""
     r, high = sight.given.mean[0], sight.given.direction[3]
     _, azimuth, elevation = (select(v > _WIDE, _WIDE, v) for v in sight.given.variances)
     e2, across = elevation * (1.0 - sight.raised), r * r * high * high * 0.5
-    return -0.5 * r * e2, 0.5 * r * r * e2 * e2, across * e2 * np.expm1(2.0 * azimuth)
+    return 0.75 * r * r * e2 * e2, across * e2 * np.expm1(2.0 * azimuth)
 
 
 def _kept(A: Array, raised: Any) -> Array:
