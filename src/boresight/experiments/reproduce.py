@@ -82,9 +82,15 @@ def _assuming(key: str, assume: Mapping[str, Any]) -> dict[str, Any]:
                 + (f"; did you mean {near[0]!r}?" if near else ""),
                 next_step=f"use {', '.join(table['assumed'])}",
             )
-        if isinstance(value, str) != isinstance(usual, str) or np.ndim(value) != np.ndim(usual):
+        if _kind(value) != _kind(usual):
             raise UsageError(f"{name}={value!r} cannot stand for {key}'s {name}={usual!r}")
     return table | {"assumed": table["assumed"] | dict(assume)}
+
+
+def _kind(value: Any) -> tuple[str, int]:
+    """Text or numbers, and whether they are a list."""
+    array = np.asarray(value)
+    return "number" if array.dtype.kind in "iuf" else array.dtype.kind, array.ndim
 
 
 def _paper(key: str) -> Callable[..., Any]:

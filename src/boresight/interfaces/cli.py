@@ -111,10 +111,15 @@ def reproduce(
     *,
     runs: Annotated[int | None, Parameter(help="Runs instead of the paper's number.")] = None,
     seed: Annotated[int | None, Parameter(help="Seed instead of the usual one.")] = None,
+    assume: Annotated[
+        list[str] | None,
+        Parameter(negative="", help="What the paper leaves open: dt_s=2. May be repeated."),
+    ] = None,
     output: Figures = None,
 ) -> Job:
     """Repeat a paper's tables and claims, with a verdict for each."""
-    return partial(jobs.reproduce, key, runs=runs, seed=seed, folder=output)
+    assumed = door.assumptions(assume or [])
+    return partial(jobs.reproduce, key, runs=runs, seed=seed, assume=assumed, folder=output)
 
 
 @app.command

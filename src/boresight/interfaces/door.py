@@ -1,8 +1,9 @@
 """What a user types, turned into what the floors below take; a mistake is named with its cure."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from boresight.errors import OutputError, UsageError
 
@@ -101,6 +102,28 @@ def columns(text: str) -> dict[str, str]:
             next_step="for example: --columns range_m=rng,azimuth_deg=az,time_s=t",
         )
     return {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
+
+
+def assumptions(texts: Sequence[str]) -> dict[str, Any]:
+    """Read `NAME=VALUE`, the value a number, a list in brackets or a text.
+
+    Raises:
+        UsageError: no equals sign.
+    """
+    pairs = [text.partition("=") for text in texts]
+    for text, (name, _, value) in zip(texts, pairs, strict=True):
+        if not (name.strip() and value.strip()):
+            raise UsageError(
+                f"--assume {text!r} is not NAME=VALUE", next_step="for example: --assume dt_s=2"
+            )
+    return {name.strip(): _value(value.strip()) for name, _, value in pairs}
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
 
 
 def folder(path: Path) -> Path:

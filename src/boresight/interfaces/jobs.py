@@ -204,7 +204,13 @@ def demo(folder: Path, manner: Manner) -> Answer:
 
 
 def reproduce(
-    key: str, manner: Manner, *, runs: int | None, seed: int | None, folder: Path | None
+    key: str,
+    manner: Manner,
+    *,
+    runs: int | None,
+    seed: int | None,
+    assume: dict[str, Any],
+    folder: Path | None,
 ) -> Answer:
     """Repeat a paper's tables, figures and claims."""
     from boresight.experiments.reproduce import SEED
@@ -212,7 +218,8 @@ def reproduce(
 
     output = door.folder(folder) if folder else None
     with progress(f"Reproducing {key}", manner):
-        found = repeat(key, runs=runs, seed=SEED if seed is None else seed, output=output)
+        seed = SEED if seed is None else seed
+        found = repeat(key, runs=runs, seed=seed, output=output, assume=assume)
     return Answer(content=found, screen=lambda _width: screens.reproduced(key, found))
 
 
