@@ -234,3 +234,13 @@ def test_what_position_and_velocity_err_together_is_expected_of_the_range_rate(c
     root[3, 1], root[3, 3] = 90.0, 100.0 * np.sqrt(1 - 0.81)
     found = surprise(Entry("range-rate"), World(PLANE, radar), mean, root, 200_000)
     assert found == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_reported_height_is_used_before_the_range_that_needs_it():
+    """Height known to 2 km beforehand and 30 m after: then range is worth its own 50 m."""
+    sensor = Radar(range_m=50.0, azimuth_deg=0.3, height_m=30.0, site=SITE)
+    mean, cov = np.array([20e3, 0, 6e3, 0, 0, 0.0]), np.diag([400.0, 400.0, 2e3, 9, 9, 9]) ** 2
+    z = np.array([c.value(mean) for c in sensor.components(SPACE)])
+    post = Entry("ducm").update(World(SPACE, sensor), mean, cov, z)
+    along = mean[:3] / np.linalg.norm(mean[:3])
+    assert np.sqrt(along @ post.cov[:3, :3] @ along) < 55.0
