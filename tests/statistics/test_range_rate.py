@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from boresight.errors import UsageError
 from boresight.experiments.bounds import average_in_covariance, bound_per_trajectory
 from boresight.experiments.metrics import anees, anis, rmse, rmse_per_scan
 from boresight.experiments.montecarlo import filtered
@@ -118,6 +119,8 @@ def test_what_is_averaged_away_loses_the_target():
     world, truth, plots = passing(30.0, 5.0, 0.0)
     found = filtered("range-rate", world.motion, world.sensor, plots, settings={"persistence": 0.0})
     assert anees(found, truth).value > 10.0
+    with pytest.raises(UsageError, match="persistence"):
+        filtered("range-rate", world.motion, world.sensor, plots, settings={"persistence": -1.0})
 
 
 @correlated

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from boresight.errors import UsageError
 from boresight.filters.converted import RATE, Converted, joined, pick, split
 from boresight.filters.posterior import Posterior, innovation, tally
 from boresight.filters.sight import Sight, convertible, read, sighted
@@ -62,6 +63,11 @@ class RangeRate:
     """
 
     persistence: float = 5.0
+
+    def __post_init__(self) -> None:
+        """It counts a variance, so it is not negative."""
+        if not self.persistence >= 0.0:
+            raise UsageError(f"persistence={self.persistence!r} is negative", next_step="use 5")
 
     plain = True
     start = staticmethod(_DUCM.start)
