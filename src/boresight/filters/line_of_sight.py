@@ -23,7 +23,7 @@ from boresight.errors import UsageError
 from boresight.filters import line_of_sight_plane, line_of_sight_space
 from boresight.filters.line_of_sight_mixture import greatest, matched, mix, split, weigh
 from boresight.filters.line_of_sight_moments import Part
-from boresight.filters.line_of_sight_plane import Shift
+from boresight.filters.line_of_sight_plane import Shift, condition
 from boresight.filters.posterior import LOG_TWO_PI, innovation
 from boresight.filters.start import SPEED_MPS, one_plot
 from boresight.filters.steps import State, Surprise
@@ -73,8 +73,7 @@ class LineOfSight:
         """Means, covariances and bends of the parts, their weights, and the platform's pose."""
         parts, n, d = self._count(motion), len(motion.names), motion.dims
         kept = {"means": Matrix(parts, n), "covs": Matrix(parts, n * (n + 1) // 2)}
-        if d == 2:
-            kept["bends"] = Matrix(parts, 2)
+        kept["bends"] = Matrix(parts, 2)
         kept["log_weights"] = Vector(parts)
         if _platform(sensor, d):
             kept |= {"position": Vector(d), "rotation": Matrix(d, d), "velocity": Vector(d)}
@@ -102,9 +101,10 @@ class LineOfSight:
         frame, platform = _frame(motion), _platform(sensor, motion.dims)
         mean, J = jacobian(lambda state: _see(state, platform), start.mean)
         whole = frame.see(Gaussian(mean, J @ start.cov @ J.T))
-        means, cov, weights = split(whole, self._count(motion))
+        means, cov, weights = split(whole, motion.dims + 1, self._count(motion))
         logs = np.log(weights / np.max(weights))
-        return _keep([frame.begin(mean, cov) for mean in means], logs, platform)
+        straight = start.mean[:2] * 0.0
+        return _keep([Part(mean, cov, straight) for mean in means], logs, platform)
 
     def predict(self, state: State, motion: Motion, sensor: Sensor, dt: Any) -> State:
         """Every part moves; a platform's turn and acceleration are a known shift."""
@@ -197,7 +197,7 @@ class View:
         value, h = self._linear(part.mean)
         nu = innovation(self.component, measured, value)[1]
         noise = self.component.sigma * self.component.sigma
-        post, s = _frame(self.motion).condition(part, h, nu, noise, there)
+        post, s = condition(part, h, nu, noise, there)
         return post, nu, s
 
     def _linear(self, mean: Array) -> tuple[Any, Array]:
@@ -252,20 +252,17 @@ def _keep(parts: Sequence[Any], logs: Array, platform: Platform | None) -> dict[
     upper = np.triu_indices(len(parts[0].mean))
     kept = {"means": np.array([part.mean for part in parts])}
     kept["covs"] = np.array([part.cov[upper] for part in parts])
-    if hasattr(parts[0], "bend"):
-        kept["bends"] = np.array([part.bend for part in parts])
+    kept["bends"] = np.array([part.bend for part in parts])
     return kept | {"log_weights": logs} | (platform._asdict() if platform else {})
 
 
-def _parts(state: State) -> list[Any]:
+def _parts(state: State) -> list[Part]:
     n = state["means"].shape[1]
     rows, columns = np.triu_indices(n)
     index = np.zeros((n, n), dtype=int)
     index[rows, columns] = index[columns, rows] = np.arange(len(rows))
     covs = state["covs"][:, index]
-    if "bends" in state:
-        return [Part(*each) for each in zip(state["means"], covs, state["bends"], strict=True)]
-    return [Gaussian(*each) for each in zip(state["means"], covs, strict=True)]
+    return [Part(*each) for each in zip(state["means"], covs, state["bends"], strict=True)]
 
 
 def _kept(state: State) -> Platform | None:

@@ -29,11 +29,12 @@ def normal_as(parts: int) -> tuple[Array, Array, float]:
     return np.array(offsets), np.array(weights), width
 
 
-def split(whole: Gaussian, parts: int) -> tuple[list[Array], Array, Array]:
-    """Several Gaussians that make up one, told apart by its last state.
+def split(whole: Gaussian, i: int, parts: int) -> tuple[list[Array], Array, Array]:
+    """Several Gaussians that make up one, told apart by its state i.
 
     Args:
         whole: mean (n,), cov (n, n).
+        i: what is split.
         parts: 1, 3 or 5.
 
     Returns:
@@ -43,7 +44,7 @@ def split(whole: Gaussian, parts: int) -> tuple[list[Array], Array, Array]:
     if parts == 1:
         return [whole.mean], whole.cov, np.ones(1)
     offsets, weights, width = normal_as(parts)
-    line = whole.cov[:, -1] / np.sqrt(whole.cov[-1, -1] + NOTHING)
+    line = whole.cov[:, i] / np.sqrt(whole.cov[i, i] + NOTHING)
     cov = mirror(whole.cov - (1.0 - width * width) * np.outer(line, line))
     return [whole.mean + x * line for x in offsets], cov, weights
 

@@ -19,12 +19,12 @@ _INDEX = np.array([[0, 1, 3, 4], [1, 2, 5, 6], [3, 5, 7, 8], [4, 6, 8, 9]])  # o
 
 
 class Part(NamedTuple):
-    """A bent Gaussian in the plane.
+    """A bent Gaussian.
 
     Attributes:
-        mean: (4,) range m, angle rad, radial and transverse velocity m/s.
-        cov: (4, 4) without what the bend adds.
-        bend: (2,) of range and radial velocity, per (m/s)² of transverse velocity.
+        mean: (n,) range m, angles rad, velocity along range and angles m/s, and what follows.
+        cov: (n, n) without what the bend adds.
+        bend: (2,) of range and radial velocity, per (m/s)² of the velocity along the azimuth.
     """
 
     mean: Array
@@ -36,7 +36,7 @@ def plane_mean(part: Part, sign: float = 1.0) -> Array:
     """Mean of x, y, vx, vy.
 
     Args:
-        part: in the frame of the line of sight.
+        part: in the plane.
         sign: 1 for the mean. -1 for the estimate that is right on average: where a truth is given
             and `part` is a normal estimate of it with this covariance, the mean of this over the
             estimates is the truth.

@@ -76,11 +76,6 @@ class _Facing(NamedTuple):
         )
 
 
-def begin(mean: Array, cov: Array) -> Part:
-    """A part that is not bent."""
-    return Part(mean, cov, cov[:2, 0] * 0.0)
-
-
 def enter(state: Array) -> Array:
     """(range, angle, radial, transverse velocity) of x, y, vx, vy relative to the sensor."""
     x, y, vx, vy = state
@@ -139,7 +134,7 @@ def move(part: Part, dt: Any, noise: Array, shift: Shift | None = None) -> Part:
     line = np.concatenate([P[1:2, _T], mixed[:, _T]])  # covariance with the velocity before
     kept = (B @ line)[_T] / (cov[_T, _T] + NOTHING)  # of a change of it in the one after
     along = mixed[:, _T] * (kept / (P[_T, _T] + NOTHING))
-    curve = B[:, 1:] @ (G @ _spread(part.bend)) * (kept * kept)
+    curve = B[:, 1:] @ (G @ spread(part.bend, 4)) * (kept * kept)
     curve = curve + facing.second_order(np.outer(along, along), bounded)
     curve = curve - cov[:, _T] * (curve[_T] / (cov[_T, _T] + NOTHING))
     return Part(mean, cov, curve[[0, 2]])
@@ -164,9 +159,10 @@ def _turned(c: Any, s: Any) -> Array:
     return np.array([[c, s, 0.0, 0.0], [-s, c, 0.0, 0.0], [0.0, 0.0, c, s], [0.0, 0.0, -s, c]])
 
 
-def _spread(bend: Array) -> Array:
-    """The bend of all four states."""
-    return np.array([bend[0], 0.0, bend[1], 0.0])
+def spread(bend: Array, n: int) -> Array:
+    """The bend of all n states."""
+    d = 2 if n == 4 else 3
+    return np.array([bend[0], *[0.0] * (d - 1), bend[1], *[0.0] * (n - d - 1)])
 
 
 def condition(part: Part, h: Array, nu: Any, noise: Any, there: Any) -> tuple[Part, Any]:
@@ -178,7 +174,7 @@ def condition(part: Part, h: Array, nu: Any, noise: Any, there: Any) -> tuple[Pa
 
     Args:
         part: what is known.
-        h: (4,) gradient of the measurement.
+        h: (n,) gradient of the measurement.
         nu: innovation.
         noise: variance of the measurement.
         there: 1 if measured, 0 if missing: then nothing changes.
@@ -187,24 +183,26 @@ def condition(part: Part, h: Array, nu: Any, noise: Any, there: Any) -> tuple[Pa
         The part, and the variance of the innovation.
     """
     mean, P, _ = part
-    bend = _spread(part.bend)
+    bend = spread(part.bend, len(mean))
+    d = 2 if len(mean) == 4 else 3
+    t = d + 1  # the transverse velocity, in space the level one
     cross, seen = P @ h, h @ bend
-    s = h @ cross + noise + 2.0 * (seen * P[_T, _T]) * (seen * P[_T, _T])
+    s = h @ cross + noise + 2.0 * (seen * P[t, t]) * (seen * P[t, t])
     gain = cross * (there / s)
     cov = mirror(P - np.outer(gain, cross))
-    across = cross - P[:, _T] * (cross[_T] / (P[_T, _T] + NOTHING))
+    across = cross - P[:, t] * (cross[t] / (P[t, t] + NOTHING))
     bend = bend - across * (seen * there / (h @ across + noise))
-    surprise = 2.0 * cov[_T, _T] * seen * nu * (there / s)
+    surprise = 2.0 * cov[t, t] * seen * nu * (there / s)
     surprise = select(surprise > _MOST, _MOST, select(surprise < -_MOST, -_MOST, surprise))
     more = surprise * (1.0 + 0.5 * surprise)
-    line = cov[:, _T]
-    cov = cov + np.outer(line, line) * (more / (line[_T] + NOTHING))
+    line = cov[:, t]
+    cov = cov + np.outer(line, line) * (more / (line[t] + NOTHING))
     line = line * (1.0 + more)
-    step = gain[_T] * nu
+    step = gain[t] * nu
     moved = 2.0 * step * bend  # of the slope
-    mean = mean + gain * nu + bend * (step * step + line[_T] - P[_T, _T])
-    cov = cov + np.outer(moved, line) + np.outer(line + moved * line[_T], moved)
-    return Part(mean, mirror(cov), np.array([bend[0], bend[2]])), s
+    mean = mean + gain * nu + bend * (step * step + line[t] - P[t, t])
+    cov = cov + np.outer(moved, line) + np.outer(line + moved * line[t], moved)
+    return Part(mean, mirror(cov), np.array([bend[0], bend[d]])), s
 
 
 def tell(part: Part) -> Gaussian:

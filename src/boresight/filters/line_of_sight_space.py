@@ -1,24 +1,20 @@
-"""Space seen along the line of sight: one Gaussian, predicted to second order.
+"""Space seen along the line of sight: one bent Gaussian, predicted to second order.
 
 The state is (range, azimuth, elevation; velocity along them), and what a motion adds.
-The frame's axes are the directions in which range, azimuth and elevation grow.
+The frame's axes are the directions in which range, azimuth and elevation grow. The bend is that of
+the velocity along the azimuth, as in `line_of_sight_plane`; what is told leaves it out.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from boresight.filters import ekf
-from boresight.filters.line_of_sight_moments import NOTHING
-from boresight.filters.line_of_sight_plane import NEAR_M2, Shift
+from boresight.filters.line_of_sight_moments import NOTHING, Part
+from boresight.filters.line_of_sight_plane import NEAR_M2, Shift, spread
 from boresight.maths import Gaussian, jacobian, mirror, select
 
 Array = Any
-
-
-def begin(mean: Array, cov: Array) -> Gaussian:
-    """The one part."""
-    return Gaussian(mean, cov)
+_T = 4  # index of the velocity along the azimuth
 
 
 def enter(state: Array) -> Array:
@@ -60,32 +56,42 @@ def see(relative: Gaussian) -> Gaussian:
     return Gaussian(enter(relative.mean), mirror(J @ relative.cov @ J.T))
 
 
-def move(part: Gaussian, dt: Any, noise: Array, shift: Shift | None = None) -> Gaussian:
+def move(part: Part, dt: Any, noise: Array, shift: Shift | None = None) -> Part:
     """The part dt seconds later, to second order.
 
     Args:
-        part: mean (n,), cov (n, n).
+        part: what is known.
         dt: s; 0 leaves it as it is.
         noise: (n, n) covariance of positions, velocities and the rest, the same along each axis.
         shift: what the platform did, if it did anything.
     """
-    mean, P = part
+    mean, P, _ = part
     still = mean * 0.0
     unsure = dt * dt * P[4, 4] + mean[0] * mean[0] * P[2, 2] + noise[0, 0]
     _, J = jacobian(lambda state: _fly(state, dt, still, unsure), mean)
     _, E = jacobian(lambda disturbance: _fly(mean, dt, disturbance, unsure), still)
-    moved = _fly(mean, dt, still, still[0]) + _outwards(part, dt)
+    moved = _fly(mean, dt, still, still[0]) + _outwards(mean, P, dt)
     cov = mirror(J @ P @ J.T + E @ noise @ E.T)
-    if shift is None:
-        return Gaussian(moved, cov)
+    line = P[:, _T]
+    kept = (J @ line)[_T] / (cov[_T, _T] + NOTHING)  # as in the plane
+    along = line * (kept / (line[_T] + NOTHING))
+    curve = J @ spread(part.bend, len(mean)) * (kept * kept)
+    curve = curve + _outwards(mean, np.outer(along, along), dt)
+    curve = curve - cov[:, _T] * (curve[_T] / (cov[_T, _T] + NOTHING))
+    after = Part(moved, cov, curve[[0, 3]])
+    return after if shift is None else _reframe(after, shift)
+
+
+def _reframe(part: Part, shift: Shift) -> Part:
+    """Seen from a platform that is elsewhere, to first order."""
 
     def elsewhere(state: Array) -> Array:
         p, v, rest = np.split(leave(state), [3, 6])
         p, v = shift.turn @ p + shift.away[:3], shift.turn @ v + shift.away[3:]
         return enter(np.concatenate([p, v, rest]))
 
-    mean, J = jacobian(elsewhere, moved)
-    return Gaussian(mean, mirror(J @ cov @ J.T))
+    mean, J = jacobian(elsewhere, part.mean)
+    return Part(mean, mirror(J @ part.cov @ J.T), part.bend)
 
 
 class _Course(NamedTuple):
@@ -138,12 +144,11 @@ def _fly(state: Array, dt: Any, disturbance: Array, unsure: Any) -> Array:
     return np.array([*place, *seen, *(state[6:] + disturbance[6:])])
 
 
-def _outwards(part: Gaussian, dt: Any) -> Array:
+def _outwards(mean: Array, P: Array, dt: Any) -> Array:
     """What second order adds to the mean of range and velocities (n,): the centripetal term.
 
     That of the angles is left out: it is about their variance times their standard deviation.
     """
-    mean, P = part
     course = _course(mean, dt, mean * 0.0, mean[0] * 0.0)
     axes, zero = course.axes, np.zeros((3, len(mean) - 6))
     rates = np.hstack([np.zeros((3, 3)), axes, zero])  # of (x, y, z) of the frame after, (3, n)
@@ -162,12 +167,7 @@ def _outwards(part: Gaussian, dt: Any) -> Array:
     return np.array([0.5 * spread * lever, 0.0, 0.0, along, across, upward, *zero[0]])
 
 
-def condition(part: Gaussian, h: Array, nu: Any, noise: Any, there: Any) -> tuple[Gaussian, Any]:
-    """One scalar update, as in `ekf.condition`."""
-    return ekf.condition(part, h, nu, noise, there)
-
-
-def tell(part: Gaussian) -> Gaussian:
+def tell(part: Part) -> Gaussian:
     """Mean and covariance of x, y, z, vx, vy, vz and the rest, relative to the sensor.
 
     Given the angles all is linear; over the two of them a Gauss-Hermite rule of three points each
@@ -187,7 +187,7 @@ def tell(part: Gaussian) -> Gaussian:
     return Gaussian(mean, mirror(cov))
 
 
-def unbiased(part: Gaussian) -> Array:
+def unbiased(part: Part) -> Array:
     """The estimate that is right on average over the plots of a target: beyond by the shrinkage."""
     return 2.0 * leave(part.mean) - tell(part).mean
 
