@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 WIDE = 100
 WORST = 8
+LONG = 4  # values of a list that are all shown
 
 
 def _table(heading: str, *heads: str, left: int = 1) -> "Table":
@@ -197,19 +198,30 @@ def reproduced(key: str, found: dict[str, Any]) -> "list[RenderableType]":
     styles = {"reproduces": "green", "in band": "green", "does not reproduce": "red"}
     for each in claims:
         verdict = _text(each["verdict"], styles.get(each["verdict"], "yellow"))
-        values = (_value(each[name]) for name in ("published", "ours"))
+        values = (_text(_lines(each[name])) for name in ("published", "ours"))
         table.add_row(each["id"], *values, verdict)
     counts = {each["verdict"]: 0 for each in claims}
     for each in claims:
         counts[each["verdict"]] += 1
     total = ", ".join(f"{number} {verdict}" for verdict, number in counts.items())
-    return [table, _text(f"{total}; seed {found['seed']}")]
+    more = "; --json adds bands, assumptions and the parts of each claim"
+    return [table, _text(f"{total}; seed {found['seed']}{more}")]
+
+
+def _lines(value: Any) -> str:
+    """A value of a claim: what has names a line each."""
+    if not isinstance(value, dict):
+        return _value(value)
+    rows = [f"{name}: {_value(each)}" for name, each in value.items()]
+    return "\n".join(rows)
 
 
 def _value(value: Any) -> str:
     if isinstance(value, float):
         return figure(value)
     if isinstance(value, (list, tuple)):
+        if len(value) > LONG:
+            return f"{_value(value[0])}, {_value(value[1])}, ... {_value(value[-1])}"
         return ", ".join(map(_value, value))
     if isinstance(value, dict):
         return ", ".join(f"{name} {_value(each)}" for name, each in value.items())
