@@ -107,8 +107,8 @@ def test_five_degrees_do_not_lose_the_target(correlation):
     models = world.motion, world.sensor
     ours = filtered("range-rate", *models, plots)
     bare = filtered("ducm", *models, without_doppler(plots))
-    assert 0.9 <= anees(ours, truth).value <= 1.15
-    assert over_bound(world, truth, plots, ours) <= 1.13
+    assert 0.9 <= anees(ours, truth).value <= 1.1
+    assert over_bound(world, truth, plots, ours) <= 1.10
     assert rmse(ours, truth) < 0.97 * rmse(bare, truth)
     assert rmse(ours, truth, of="velocity") < 0.9 * rmse(bare, truth, of="velocity")
     assert anees(filtered("ducm", *models, plots), truth).value > 20.0
