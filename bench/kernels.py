@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 import boresight as bs
-import formulas
-from boresight import catalogue
+from boresight import Radar, catalogue
 from boresight.lanes import (
     Kernel,
     Leaf,
@@ -27,18 +26,21 @@ from boresight.lanes import (
     trace,
 )
 from boresight.lanes.elementary import lower
+from boresight.models.motion import Motion
 from c_code import COMMON, FLAGS, FORMS, gcc_kernel
 from measure import at_most, interleaved, machine, publish
-from scenario import DT, RADAR, SPATIAL, Scenario, planar, straight
+from scenario import DT, FLAT, PLANAR, RADAR, SPATIAL, Scenario, planar, straight
 
 Array = Any
 RUNS, STEPS, ROUNDS = 1000, 500, 9
 LIMIT, AGREEMENT = 1.3, 1e-12
 
 
-def recorded(name: str) -> tuple[Program, dict[str, Any]]:
-    """A filter of the catalogue, six states, with the means of every step out, and its numbers."""
-    recursion = catalogue.lookup(name).recursion(SPATIAL, RADAR)
+def recorded(
+    name: str, motion: Motion = SPATIAL, radar: Radar = RADAR
+) -> tuple[Program, dict[str, Any]]:
+    """A filter of the catalogue with the means of every step out, and its numbers."""
+    recursion = catalogue.lookup(name).recursion(motion, radar)
     models = recursion.models()
     n, k = recursion.size
     shapes = {"z": (Vector(k), Rate.EACH), "dt": (Leaf(), Rate.FIXED)}
@@ -62,11 +64,9 @@ def started(program: Program, given: Scenario) -> States:
 def problems() -> dict[str, tuple[Program, dict[str, Any], Scenario]]:
     """Program, fixed inputs and plots of each kernel."""
     space = straight(RUNS, STEPS)
-    noises = {"range_m": 30.0, "azimuth_rad": np.radians(0.5), "elevation_rad": np.radians(0.5)}
-    flat = {name: noises[name] for name in ("range_m", "azimuth_rad")}
     return {
         "mekf": (*recorded("mekf"), space),
-        "ducm": (formulas.record(formulas.ducm, 4, 2), flat, planar(space)),
+        "ducm": (*recorded("ducm", PLANAR, FLAT), planar(space)),
         "ukf": (*recorded("ukf"), space),
     }
 

@@ -16,6 +16,7 @@ from measure import RESULTS, version
 FOLDER = Path(__file__).parent
 SCRIPTS: dict[str, tuple[str, ...]] = {  # packages without which there is nothing to compare with
     "kernels": (),
+    "filters": (),
     "peers": ("filterpy", "stonesoup", "dynamax", "nrl-tracker"),
     "startup": (),
     "commands": ("pytest",),  # whose tests hold the bad files

@@ -12,6 +12,7 @@ DT = 1.0  # s
 PLANAR = ConstantVelocity(accel_mps2=0.5, dims=2)
 SPATIAL = ConstantVelocity(accel_mps2=0.5, dims=3)
 RADAR = Radar(range_m=30.0, azimuth_deg=0.5, elevation_deg=0.5)
+FLAT = Radar(range_m=30.0, azimuth_deg=0.5)
 SIGMA = np.array([30.0, np.radians(0.5), np.radians(0.5)])  # m, rad, rad
 
 
