@@ -120,6 +120,7 @@ class LineOfSight:
     ) -> tuple[State, Surprise]:
         """Component by component, what is linear first; the plot's likelihood weighs the parts."""
         parts, logs, platform = _parts(state), list(state["log_weights"]), _kept(state)
+        spreads: list[Any] = [1.0] * len(parts)  # products of variances: one logarithm a part
         z, components = sensor.independent(z, motion)
         seen: list[Any] = []
         squares: list[Any] = []
@@ -130,14 +131,19 @@ class LineOfSight:
             there = select(missing(z[i]), 0.0, 1.0)
             told = [views[i].condition(part, z[i], there) for part in parts]
             parts = [part for part, _, _ in told]
-            nus[i], s = matched(logs, *list(zip(*told, strict=True))[1:])
+            nus[i], s = matched(_weighed(logs, spreads), *list(zip(*told, strict=True))[1:])
             variances[i] = select(there < 0.5, np.nan, s)
             seen.append(there)
             squares.append(nus[i] * nus[i] / s)
             logs = [
-                log - 0.5 * there * (nu * nu / s + np.log(s))
+                log - 0.5 * there * (nu * nu * (1.0 / s))
                 for log, (_, nu, s) in zip(logs, told, strict=True)
             ]
+            spreads = [
+                spread * select(there < 0.5, 1.0, s)
+                for spread, (_, _, s) in zip(spreads, told, strict=True)
+            ]
+        logs = _weighed(logs, spreads)
         top = greatest(logs)
         kept = _keep(parts, np.array([log - top for log in logs]), platform)
         share = sum(np.exp(kept["log_weights"])) / sum(np.exp(state["log_weights"]))
@@ -159,6 +165,11 @@ class LineOfSight:
             mean, J = jacobian(lambda relative: _show(relative, platform), mean)
             cov = J @ cov @ J.T
         return Gaussian(mean, mirror(cov))
+
+
+def _weighed(logs: Sequence[Any], spreads: Sequence[Any]) -> list[Any]:
+    """Logarithms of weights: exponents, and the roots of the products of variances."""
+    return [log - 0.5 * np.log(s) for log, s in zip(logs, spreads, strict=True)]
 
 
 class Platform(NamedTuple):

@@ -42,7 +42,7 @@ def plane_mean(part: Part, sign: float = 1.0) -> Array:
             estimates is the truth.
     """
     z, c, bend, _ = _complex(part)
-    fade = np.exp(-0.5 * sign * part.cov[1, 1])
+    fade = 1.0 + np.expm1(-0.5 * sign * part.cov[1, 1])
     turn = fade * np.array([np.cos(part.mean[1]), np.sin(part.mean[1])])
     return np.concatenate([_times(z[a] + _i(c[a], sign) - _real(bend[a]), turn) for a in (0, 1)])
 
@@ -69,7 +69,8 @@ def _second_moments(part: Part, a: int, b: int) -> tuple[Array, Array]:
     P = part.cov
     z, c, k, bend = _complex(part)
     cross, var = 4.0 * P[1, 3], P[3, 3]
-    f = np.expm1(-P[1, 1])
+    half = np.expm1(-0.5 * P[1, 1])  # which the mean needs too
+    f = half * (2.0 + half)
     e = 1.0 + f
     plus = [_real(P[0, 0]), P[0, 2:], np.array([P[2, 2] - P[3, 3], 2.0 * P[2, 3]])][a + b]
     minus = [_real(P[0, 0]), P[0, 2:] * [1.0, -1.0], _real(P[2, 2] + P[3, 3])][a + b]

@@ -56,14 +56,14 @@ class _Facing(NamedTuple):
             ]
         )
 
-    def second_order(self, A: Array, square: Any) -> Array:
+    def second_order(self, A: Array, inverse: Any) -> Array:
         """(4,) what second moments A (4, 4) of along, across and their rates add to the mean.
 
         Args:
             A: second moments.
-            square: range squared, not less than the second moments that bound a close pass.
+            inverse: 1 / range squared, not more than the moments that bound a close pass allow.
         """
-        slip = -A[0, 1] / square
+        slip = -A[0, 1] * inverse
         half = 0.5 * A[1, 1] * self.lever * self.lever
         a, b = self.radial, self.transverse
         return np.array(
@@ -117,7 +117,8 @@ def move(part: Part, dt: Any, noise: Array, shift: Shift | None = None) -> Part:
     near = square < NEAR_M2
     square = select(near, NEAR_M2, square)
     distance = np.sqrt(square)
-    c, s = select(near, 1.0, u[0] / distance), select(near, 0.0, u[1] / distance)
+    inverse = 1.0 / distance
+    c, s = select(near, 1.0, u[0] * inverse), select(near, 0.0, u[1] * inverse)
     turn = _turned(c, s)
     G = turn @ G
     mixed = G @ P
@@ -130,13 +131,14 @@ def move(part: Part, dt: Any, noise: Array, shift: Shift | None = None) -> Part:
     joint = np.block([[P[1:2, 1:2], beside.T], [beside, A]])
     cov = mirror(B @ joint @ B.T)
     start = np.array([distance, angle + np.arctan2(s, c), facing.radial, facing.transverse])
-    mean = start + facing.second_order(A, bounded + A[0, 0])
+    mean = start + facing.second_order(A, 1.0 / (bounded + A[0, 0]))
     line = np.concatenate([P[1:2, _T], mixed[:, _T]])  # covariance with the velocity before
-    kept = (B @ line)[_T] / (cov[_T, _T] + NOTHING)  # of a change of it in the one after
+    sure = 1.0 / (cov[_T, _T] + NOTHING)
+    kept = (B @ line)[_T] * sure  # of a change of it in the one after
     along = mixed[:, _T] * (kept / (P[_T, _T] + NOTHING))
     curve = B[:, 1:] @ (G @ spread(part.bend, 4)) * (kept * kept)
-    curve = curve + facing.second_order(np.outer(along, along), bounded)
-    curve = curve - cov[:, _T] * (curve[_T] / (cov[_T, _T] + NOTHING))
+    curve = curve + facing.second_order(np.outer(along, along), facing.lever * facing.lever)
+    curve = curve - cov[:, _T] * (curve[_T] * sure)
     return Part(mean, cov, curve[[0, 2]])
 
 
@@ -188,11 +190,12 @@ def condition(part: Part, h: Array, nu: Any, noise: Any, there: Any) -> tuple[Pa
     t = d + 1  # the transverse velocity, in space the level one
     cross, seen = P @ h, h @ bend
     s = h @ cross + noise + 2.0 * (seen * P[t, t]) * (seen * P[t, t])
-    gain = cross * (there / s)
+    share = there * (1.0 / s)
+    gain = cross * share
     cov = mirror(P - np.outer(gain, cross))
     across = cross - P[:, t] * (cross[t] / (P[t, t] + NOTHING))
     bend = bend - across * (seen * there / (h @ across + noise))
-    surprise = 2.0 * cov[t, t] * seen * nu * (there / s)
+    surprise = 2.0 * cov[t, t] * seen * nu * share
     surprise = select(surprise > _MOST, _MOST, select(surprise < -_MOST, -_MOST, surprise))
     more = surprise * (1.0 + 0.5 * surprise)
     line = cov[:, t]
