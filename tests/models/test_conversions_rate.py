@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from boresight.maths import elimination
 from boresight.models.conversions import convert
 from boresight.models.conversions_rate import GivenRate, convert_with_rate, rate_moments
 from boresight.models.polar import Given
@@ -34,18 +35,18 @@ def pseudo(polar, rate, shift, sigma=None):
     return np.concatenate([x, (polar[0] * rate - shift)[None]])
 
 
-def predicted(d, correlation):
-    truth, rate, outer = draws(MEAN[:d], RATE, SPREAD[:d], RATE_SPREAD, TOGETHER)
-    noise, wind, inner = draws([0.0] * d, 0.0, SIGMA[:d], RATE_SIGMA, correlation)
-    shift = correlation * SIGMA[0] * RATE_SIGMA
+def predicted(d, correlation, sigma=SIGMA, spread=SPREAD):
+    truth, rate, outer = draws(MEAN[:d], RATE, spread[:d], RATE_SPREAD, TOGETHER)
+    noise, wind, inner = draws([0.0] * d, 0.0, sigma[:d], RATE_SIGMA, correlation)
+    shift = correlation * sigma[0] * RATE_SIGMA
     plots = truth[:, :, None] + noise[:, None, :]
-    measured = pseudo(plots, rate[:, None] + wind, shift, SIGMA[:d])
+    measured = pseudo(plots, rate[:, None] + wind, shift, sigma[:d])
     errors = measured - pseudo(truth[:, :, None], rate[:, None], 0.0)
     given = GivenRate(
-        Given(MEAN[:d], np.square(SPREAD[:d])),
+        Given(MEAN[:d], np.square(spread[:d])),
         RATE,
         RATE_SPREAD**2,
-        TOGETHER * RATE_SPREAD * SPREAD[0],
+        TOGETHER * RATE_SPREAD * spread[0],
     )
     return errors, outer, inner, given
 
@@ -77,6 +78,57 @@ def test_a_first_scan_has_the_mean_square_error_that_the_plot_leaves_possible(d,
     exact = quadrature.second(errors, weights).astype(float)
     sd = np.sqrt(np.diag(exact))
     assert np.max(np.abs(found.cov - exact) / np.outer(sd, sd)) < 1e-12
+
+
+WIDTHS = [(0.01, 60.0), (0.1, 0.01), (1.0, 10.0), (10.0, 1.0), (60.0, 0.1)]  # degrees
+
+
+@pytest.mark.parametrize("correlation", CORRELATIONS)
+@pytest.mark.parametrize("widths", WIDTHS, ids=str)
+@pytest.mark.parametrize("d", [2, 3])
+def test_given_a_prediction_or_the_plot_at_any_width_of_the_angles(d, widths, correlation):
+    sigma = [150.0, *(width * DEG for width in widths)]
+    spread = [250.0, *(min(2.0 * width, 20.0) * DEG for width in widths)]
+    z = np.array([*MEAN[:d], RATE])
+    errors, outer, inner, given = predicted(d, correlation, sigma, spread)
+    weights = np.multiply.outer(outer, inner).ravel()
+    found = convert_with_rate(z, [*sigma[:d], RATE_SIGMA], correlation, given)
+    agree(found.cov, quadrature.second(errors.reshape(d + 1, -1), weights))
+    noise, wind, weights = draws([0.0] * d, 0.0, sigma[:d], RATE_SIGMA, correlation)
+    first = convert_with_rate(z, [*sigma[:d], RATE_SIGMA], correlation)
+    errors = first.mean[:, None] - pseudo(z[:-1, None] - noise, z[-1] - wind, 0.0)
+    agree(first.cov, quadrature.second(errors, weights))
+
+
+def agree(found, exact):
+    """In every direction, relative to the exact covariance there: acceptance 1."""
+    exact = exact.astype(float)
+    sd = np.sqrt(np.diag(exact))
+    L = np.linalg.cholesky(exact / np.outer(sd, sd))
+    off = np.linalg.solve(L, (found - exact) / np.outer(sd, sd))
+    assert np.max(np.abs(np.linalg.solve(L, off.T))) <= 1e-8
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_positive_definite_in_a_million_draws(d):
+    n, rng = 1_000_000, np.random.default_rng(d)
+
+    def decades(low, high, rows=1):
+        return 10.0 ** rng.uniform(np.log10(low), np.log10(high), (rows, n))
+
+    r = decades(1.0, 1e6)
+    angles = rng.uniform(-1.0, 1.0, (d - 1, n)) * np.array([np.pi, np.pi / 2])[: d - 1, None]
+    z = np.concatenate([r, angles, rng.normal(scale=300.0, size=(1, n))])
+    sigma = np.concatenate([r * decades(1e-6, 0.3), decades(0.01, 60, d - 1) * DEG])
+    sigma = np.concatenate([sigma, decades(0.01, 30)])
+    correlation, together = rng.uniform(-0.99, 0.99, (2, n))
+    spread = sigma * rng.uniform(0.0, 2.0, (d + 1, n))
+    place = Given(z[:-1], np.square(spread[:-1]))
+    given = GivenRate(place, z[-1], spread[-1] ** 2, together * spread[-1] * spread[0])
+    for condition in (given, None):
+        pivots = elimination(convert_with_rate(z, sigma, correlation, condition).cov)
+        assert len(pivots) == d + 1
+        assert all(np.all(pivot > 0) for pivot in pivots)
 
 
 @pytest.mark.parametrize("d", [2, 3])
