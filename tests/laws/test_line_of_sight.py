@@ -13,11 +13,10 @@ from boresight.filters import line_of_sight_plane as plane
 from boresight.filters import line_of_sight_space as space
 from boresight.filters.line_of_sight import LineOfSight
 from boresight.filters.line_of_sight_mixture import normal_as
-from boresight.filters.recursion import run_recursion
 from boresight.filters.start import one_plot
 from boresight.maths import Gaussian
 from boresight.models.sensors import Pose, Radar
-from laws.enrolled import PLANAR, PLANE, POLAR, POLAR_WORLDS, POSE, SPACE, World, tilted, turned
+from laws.enrolled import PLANAR, PLANE, POLAR_WORLDS, POSE, SPACE, World, tilted, turned
 
 MEAN = np.array([800.0, 2.1, 12.0, -20.0])
 HIGH = np.array([8e3, 2.1, 0.6, 12.0, -120.0, 60.0])
@@ -221,46 +220,6 @@ def test_likelihood_is_that_of_the_mixture():
         total += w * np.exp(-quadratic / 2) / (2 * np.pi * np.sqrt(np.linalg.det(S)))
     assert surprise.loglik == pytest.approx(np.log(total), rel=1e-9)
     assert surprise.dof == 2
-
-
-def tracked(world, z, start, dt):
-    recursion = catalogue.lookup("line-of-sight").recursion(world.motion, world.sensor)
-    return run_recursion(recursion, z, dt, start, outputs=("mean", "cov", "nis", "loglik"))
-
-
-@pytest.mark.parametrize(
-    ("motion", "sensor"), [(PLANE, PLANAR), (SPACE, POLAR)], ids=["plane", "space"]
-)
-def test_a_turning_and_moving_sensor_gives_the_same_track(motion, sensor):
-    """In a world that moves along with a sensor that turns at every scan; to 1e-9."""
-    lanes, steps, d = 5, 8, motion.dims
-    world = World(motion, sensor)
-    priors = [world.prior(lane) for lane in range(lanes)]
-    start = Gaussian(*(np.stack(part) for part in zip(*priors, strict=True)))
-    truth = start.mean
-    z = np.array([[world.plot(x, (lane, t)) for t in range(steps)] for lane, x in enumerate(truth)])
-    dt = np.array([[0.0, *[2.0] * (steps - 1)]])
-    fixed = tracked(world, z, start, dt)
-    angle = np.where(np.arange(steps) > 0, 0.3 * np.arange(steps) ** 1.5, 0.0)
-    velocity, origin = np.array([80.0, -35.0, 4.0]), np.array([9e3, 2e4, -500.0])
-    place = origin + velocity * np.cumsum(dt)[:, None]
-    pose = Pose(
-        position_m=place[None],
-        rotation=np.stack([turned(-a) for a in angle])[None],
-        velocity_mps=np.broadcast_to(velocity, (1, steps, 3)),
-    )
-    turning = World(motion, replace(sensor, pose=pose))
-    seen = z.copy()
-    seen[..., 1] -= angle
-    offset = np.concatenate([origin[:d], velocity[:d]])
-    moving = tracked(turning, seen, Gaussian(start.mean + offset, start.cov), dt)
-    along = np.concatenate([place[:, :d], np.broadcast_to(velocity[:d], (steps, d))], axis=1)
-    size = np.abs(fixed.mean).max((0, 1))
-    np.testing.assert_allclose((moving.mean - along) / size, fixed.mean / size, atol=1e-9)
-    sd = np.sqrt(np.einsum("bsii->bsi", fixed.cov))
-    scale = sd[..., :, None] * sd[..., None, :]
-    np.testing.assert_allclose(moving.cov / scale, fixed.cov / scale, atol=1e-9)
-    np.testing.assert_allclose(moving.loglik, fixed.loglik, rtol=1e-9)
 
 
 @pytest.mark.parametrize("motion", [PLANE, SPACE], ids=["plane", "space"])
