@@ -17,6 +17,7 @@ FOLDER = Path(__file__).parent
 SCRIPTS: dict[str, tuple[str, ...]] = {  # packages without which there is nothing to compare with
     "kernels": (),
     "filters": (),
+    "accuracy": (),
     "peers": ("filterpy", "stonesoup", "dynamax", "nrl-tracker"),
     "startup": (),
     "commands": ("pytest",),  # whose tests hold the bad files

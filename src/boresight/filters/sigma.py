@@ -30,6 +30,7 @@ import numpy as np
 
 from boresight.errors import UsageError
 from boresight.filters import kalman
+from boresight.filters.kalman import Linear
 from boresight.filters.posterior import Posterior, innovation
 from boresight.filters.steps import Updating
 from boresight.maths import (
@@ -148,22 +149,6 @@ def predict(prior: Gaussian, motion: Motion, dt: Any, *, rule: Rule = CUBATURE) 
     return Gaussian(moved, mirror(D @ D.T + rest + motion.noise(dt)))
 
 
-class Linear(NamedTuple):
-    """Components as linear ones of a prior.
-
-    Attributes:
-        nu: (k,) innovations, 0 where missing.
-        H: (k, n) slopes, 0 where missing.
-        noise: (k, k) covariance of noise and of what is not linear; rows of 1 where missing.
-        seen: (k,) 1 where measured, else 0.
-    """
-
-    nu: Array
-    H: Array
-    noise: Array
-    seen: Array
-
-
 def update(
     prior: Gaussian,
     z: Array,
@@ -194,7 +179,7 @@ def update(
     first = kalman.condition(prior, *best)
     for _ in range(iterations - 1):
         again = linearise(prior, _posterior(prior, best), z, components, rule)
-        better = _volume(again.noise) < _volume(best.noise)
+        better = _volume(again.R) < _volume(best.R)
         best = Linear(*(select(better, a, b) for a, b in zip(again, best, strict=True)))
     last = kalman.condition(prior, *best)
     return Posterior(last.mean, last.cov, *first[2:])
@@ -222,7 +207,6 @@ def linearise(
     )
     pairs = [innovation(c, v, p) for c, v, p in zip(components, z, predicted, strict=True)]
     seen, nu = (np.array(part) for part in zip(*pairs, strict=True))
-    nu = np.array([select(s < 0.5, 0.0, v) for s, v in zip(seen, nu, strict=True)])
     slopes = upper_solve(L, inverse, D.T).T
     H = np.array([select(s < 0.5, 0.0, h) for s, h in zip(seen, slopes, strict=True)])
     noise = rest + np.diag(np.array([c.sigma * c.sigma for c in components]))
@@ -242,9 +226,9 @@ def _values(components: Sequence[Component], x: Array) -> Array:
 
 def _posterior(prior: Gaussian, known: Linear) -> Gaussian:
     """The prior conditioned on linear components: `kalman.condition` in its short form."""
-    nu, H, noise, _ = known
+    nu, H, R, _ = known
     across = H @ prior.cov
-    L, inverse = cholesky(mirror(across @ H.T + noise))
+    L, inverse = cholesky(mirror(across @ H.T + R))
     half = lower_solve(L, inverse, across)
     mean = prior.mean + half.T @ lower_solve(L, inverse, nu)
     return Gaussian(mean, mirror(prior.cov - half.T @ half))
@@ -257,7 +241,8 @@ def _volume(cov: Array) -> Any:
 
 def _method(rule: Rule, iterations: int | None = 1) -> Updating:
     settings = (("iterations", iterations), ("rule", rule))
-    return Updating(formula=update, settings=settings, moved=partial(predict, rule=rule))
+    moved = partial(predict, rule=rule)
+    return Updating(formula=update, settings=settings, moved=moved, conversion="mucm")
 
 
 @cache

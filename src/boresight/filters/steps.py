@@ -78,11 +78,14 @@ class Updating:
         formula: (prior, z, components, **settings) -> Posterior.
         settings: keyword arguments of the formula.
         moved: (prior, motion, dt) -> Gaussian, the prediction.
+        conversion: of the first plot: `conventional` goes with a filter that linearises, `mucm`
+            (the moments of the position given the plot) with one that takes moments.
     """
 
     formula: Update
     settings: tuple[tuple[str, Any], ...] = ()
     moved: Predict = kalman.predict
+    conversion: str = "conventional"
 
     @property
     def plain(self) -> bool:
@@ -92,8 +95,9 @@ class Updating:
     def start(
         self, z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float = SPEED_MPS
     ) -> Gaussian:
-        """Position by the conventional conversion, velocity unknown."""
-        return one_plot(z, motion, sensor, speed_mps=speed_mps)
+        """Position by the conversion, velocity unknown."""
+        chosen = self.conversion
+        return one_plot(z, motion, sensor, speed_mps=speed_mps, conversion=chosen)
 
     def layout(self, motion: Motion, sensor: Sensor) -> dict[str, Leaf]:
         """Mean and covariance."""
