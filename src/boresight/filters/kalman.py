@@ -7,7 +7,7 @@ linear motion that is the transition matrix itself); the update is in Joseph's f
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,15 @@ from boresight.models.components import FORMULAS, Component
 from boresight.models.motion import Motion
 
 Array = Any
+
+
+class Linear(NamedTuple):
+    """A plot as a linear measurement: fields as `condition` takes them."""
+
+    nu: Array
+    H: Array
+    R: Array
+    seen: Array
 
 
 def predict(prior: Gaussian, motion: Motion, dt: Any) -> Gaussian:

@@ -133,8 +133,7 @@ def _step(method: str, source: str) -> Callable[..., tuple[Any, Any]]:
         s2, heard, begun = inputs["sigma"] * inputs["sigma"], state["heard"], state["begun"]
         bearing = Gaussian(state["bearing"], state["spread"] + inputs["turn"] * inputs["turn"])
         closing = Gaussian(state["closing"], state["variance"] + inputs["drift"] * inputs["drift"])
-        where = bearing if source == "filter" else Gaussian(bearing.mean, s2)
-        found = _nullified(method, heard, where, inputs)
+        found = _nullified(method, heard, bearing, inputs)
         closing = _followed(closing, begun, found.mean - closing.mean, found.cov)
         off = wrap(inputs["measured"] - bearing.mean)
         bearing = _followed(bearing, heard if source == "filter" else 0.0, off, s2)

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boresight.filters import ekf, kalman
+from boresight.filters.kalman import Linear
 from boresight.filters.posterior import Posterior
 from boresight.maths import Gaussian, jacobian, missing, select
 from boresight.models.components import Component
@@ -54,15 +55,6 @@ class Sight(NamedTuple):
     axes: Array
     usable: Any
     raised: Any
-
-
-class Linear(NamedTuple):
-    """A linear measurement: innovation (k,), gradients (k, n), noise (k, k), seen (k,) 1 or 0."""
-
-    nu: Array
-    H: Array
-    R: Array
-    seen: Array
 
 
 def relative_place(mean: Array, motion: Motion, sensor: Sensor) -> tuple[Array, Array]:

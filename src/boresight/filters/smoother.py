@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.filters import sigma
 from boresight.lanes import (
     Kernel,
     Matrix,
@@ -62,10 +63,7 @@ def tangent(mean: Array, L: Array, motion: Motion, dt: Any) -> Step:
 
 
 def cubature(mean: Array, L: Array, motion: Motion, dt: Any) -> Step:
-    """The motion regressed on 2n cubature points: sarkka2008's smoother, with equal weights.
-
-    Half the difference of a pair of moved points is what becomes of a column of L; how the pairs'
-    midpoints scatter is curvature, and is added to the noise. So nothing cancels.
+    """The motion regressed on cubature points: sarkka2008's smoother, with equal weights.
 
     Args:
         mean: (n,).
@@ -73,13 +71,10 @@ def cubature(mean: Array, L: Array, motion: Motion, dt: Any) -> Step:
         motion: how the target moves.
         dt: s.
     """
-    spread = float(np.sqrt(len(mean)))
-    pairs = [(motion.move(mean + d, dt), motion.move(mean - d, dt)) for d in spread * L.T]
-    middles = np.array([(a + b) * 0.5 for a, b in pairs])
-    moved = sum(middles) / len(mean)
-    bend = middles - moved
-    D = np.array([(a - b) * (0.5 / spread) for a, b in pairs]).T
-    return Step(moved, D, motion.noise(dt) + bend.T @ bend / len(mean))
+    found = sigma.regress(
+        lambda state: motion.move(state, dt), np.subtract, mean, L, sigma.CUBATURE
+    )
+    return Step(found.mean, found.D, motion.noise(dt) + found.rest)
 
 
 LINEARISATIONS = {"jacobian": tangent, "cubature": cubature}

@@ -14,12 +14,12 @@ covariance in the motion's coordinates.
 """
 
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
-from boresight.filters import kalman, sigma
-from boresight.filters.posterior import Posterior, innovation
+from boresight.filters import ekf, sigma
 from boresight.filters.start import SPEED_MPS, one_plot
 from boresight.filters.steps import State, Surprise, gaussian_layout
 from boresight.lanes import Leaf, Matrix, Vector
@@ -169,13 +169,12 @@ class SphericalCubature:
     ) -> tuple[State, Surprise]:
         """Range and angles exactly; then what is not linear in them, by cubature."""
         z, components = sensor.independent(z, motion)
-        pose, d, n = _pose(sensor), motion.dims, len(state["mean"])
+        pose, d = _pose(sensor), motion.dims
         linear = [i for i, c in enumerate(components) if c.name in _POLAR[:d]]
         curved = [i for i in range(len(z)) if i not in linear]
         latest, found = Gaussian(state["mean"], state["cov"]), []
         if linear:
-            rows = [np.eye(n)[_POLAR.index(components[i].name)] for i in linear]
-            found.append(_exact(latest, z[linear], [components[i] for i in linear], rows))
+            found.append(ekf.update(latest, z[linear], [_element(components[i]) for i in linear]))
             latest = Gaussian(*found[-1][:2])
         if curved:
             bent = [_in_polar(components[i], d, pose) for i in curved]
@@ -229,19 +228,10 @@ def _turned(cov: Array, J: Array) -> Array:
     return mirror(np.block([[J @ cov[:d, :d] @ J.T, across], [across.T, cov[d:, d:]]]))
 
 
-def _exact(prior: Gaussian, z: Array, components: list[Component], rows: list[Array]) -> Posterior:
-    """Condition on elements of the state."""
-    pairs = [
-        innovation(c, value, row @ prior.mean)
-        for c, value, row in zip(components, z, rows, strict=True)
-    ]
-    seen, nu = (np.array(part) for part in zip(*pairs, strict=True))
-    H = np.array([row * there for row, there in zip(rows, seen, strict=True)])
-    noise = [
-        select(there < 0.5, 1.0, c.sigma * c.sigma)
-        for c, there in zip(components, seen, strict=True)
-    ]
-    return kalman.condition(prior, nu, H, np.diag(np.array(noise)), seen)
+def _element(component: Component) -> Component:
+    """Range or an angle as the element of the kept state that it is: an EKF is exact then."""
+    element = itemgetter(_POLAR.index(component.name))
+    return Component(component.name, element, component.sigma)
 
 
 def _in_polar(component: Component, dims: int, pose: Pose | None) -> Component:
