@@ -244,7 +244,7 @@ def test_normalised_error_squared(sigma_deg):
     weights = np.full(10_000, 1e-4)
     for name in ("ucm", "mucm"):
         totals = []
-        for bearing in np.radians(np.arange(0, 91, 15)):
+        for bearing in np.radians(np.arange(-180, 180, 15)):
             truth = np.array([[DISTANCE], [bearing]])
             found = convert(name, truth + noise, sigma)
             errors = found.mean - quadrature.cartesian(truth)

@@ -33,8 +33,9 @@ def test_static_ducm_knows_its_errors():
     assert consistency[LAST] <= 1.10
     assert consistency.max() <= 1.20
     fine = bordonaro.static(2.5)
-    # 99 % of consistent filters: 2 * 10,000 degrees of freedom, 1 +- 2.576 / sqrt(10,000).
-    assert anees(fine, tracked(fine, "ducm"))[LAST] == pytest.approx(1.0, abs=0.0258)
+    # 99 % of consistent filters: 2 * 10,000 degrees of freedom, 1 +- 2.576 / sqrt(10,000). At every
+    # scan; estimates of one run resemble each other, so this is far less than 100 chances to fail.
+    assert np.abs(anees(fine, tracked(fine, "ducm")) - 1.0).max() <= 0.0258
 
 
 @pytest.mark.parametrize(("name", "least", "most"), [("ucm", 275, 295), ("mucm", -25, -5)])
