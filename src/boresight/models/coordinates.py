@@ -8,9 +8,9 @@ import numpy as np
 
 from boresight.errors import UsageError
 from boresight.maths import cholesky, lower_solve, missing, select
+from boresight.models.checks import as_number, standard_deviation
 from boresight.models.components import Component
 from boresight.models.motion import Motion
-from boresight.models.sensors import standard_deviation
 
 Array = Any
 
@@ -75,9 +75,12 @@ class CartesianPlots:
 
     def __post_init__(self) -> None:
         """The covariance becomes an array, and is checked."""
-        cov = np.asarray(self.cov, dtype=float)
+        cov = np.asarray(as_number("cov", self.cov))
         if cov.ndim < 2 or cov.shape[-2:] not in ((2, 2), (3, 3)):
-            raise UsageError(f"cov of shape {cov.shape} is not the covariance of a position")
+            raise UsageError(
+                f"cov of shape {cov.shape} is not the covariance of a position",
+                next_step="give (2, 2) or (3, 3), or one for every plot: (lanes, steps, 3, 3)",
+            )
         object.__setattr__(self, "cov", cov)
 
     @property

@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args, get_origin
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.models.checks import not_negative
 
 Array = Any
 
@@ -20,16 +21,13 @@ def check_motion(motion: Any) -> None:
     for field in fields(motion):
         value = getattr(motion, field.name)
         if field.type is float:
-            number = np.asarray(value, dtype=float)
-            if not np.all(number >= 0):
-                raise UsageError(f"{field.name}={value!r} is not a standard deviation")
-            object.__setattr__(motion, field.name, number if number.ndim else float(number))
+            object.__setattr__(motion, field.name, not_negative(field.name, value))
         elif get_origin(field.type) is Literal and value not in get_args(field.type):
             raise UsageError(
                 f"{field.name}={value!r} is unknown",
                 next_step=f"use one of {', '.join(get_args(field.type))}",
             )
-    if motion.dims not in (2, 3):
+    if not isinstance(motion.dims, int) or motion.dims not in (2, 3):
         raise UsageError(f"dims={motion.dims!r} is neither 2 nor 3")
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from boresight.errors import UsageError
 from boresight.maths import select
 from boresight.models.kinematics import check_motion, each_axis, state_names, taylor
 
@@ -227,6 +228,11 @@ class WithHeightOffset:
     drift_m_per_sqrt_s: float
 
     def __post_init__(self) -> None:
+        if not isinstance(self.inner, ConstantVelocity | ConstantAcceleration) or self.dims != 3:
+            raise UsageError(
+                f"inner={self.inner!r} has no height to be offset",
+                next_step="use ConstantVelocity or ConstantAcceleration with dims=3",
+            )
         check_motion(self)
 
     @property

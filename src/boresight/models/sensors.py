@@ -6,7 +6,7 @@ A plot is an array (k,), SI units and radians, NaN where a component was not mea
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,12 +15,14 @@ from boresight.errors import UsageError
 from boresight.maths import missing, select
 from boresight.maths.frames import Site, ellipsoid_height
 from boresight.models.atmosphere import EARTH_M, Atmosphere
+from boresight.models.checks import as_number, rotation, standard_deviation, vector
 from boresight.models.components import FORMULAS, Component
 from boresight.models.motion import OFFSET, Motion
 
 Array = Any
 _RADIANS = np.pi / 180.0
 _ROUNDS = 4  # of taking the air's effect out: each leaves a tenth of the error
+_UPWARD = ("elevation_rad", "height_m", "pressure_altitude_m")  # what a plane does not have
 _SIGMAS = (
     "range_m",
     "azimuth_deg",
@@ -41,11 +43,22 @@ class Pose:
         velocity_mps: (3,), in the track frame.
 
     Each may have leading axes (lanes, steps): a moving platform is a pose for every step.
+
+    Raises:
+        UsageError: no three numbers, or axes that are no rotation.
     """
 
     position_m: Array = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
     rotation: Array = field(default_factory=lambda: np.eye(3), metadata={"shape": (3, 3)})
     velocity_mps: Array = field(default_factory=lambda: np.zeros(3), metadata={"shape": (3,)})
+
+    def __post_init__(self) -> None:
+        """Numbers become arrays, and are checked; symbols of a recorded formula are left alone."""
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if not (isinstance(value, np.ndarray) and value.dtype.hasobject):
+                checked = rotation(value) if each.name == "rotation" else vector(each.name, value)
+                object.__setattr__(self, each.name, checked)
 
 
 class Sensor(Protocol):
@@ -105,6 +118,7 @@ class Radar:
                 object.__setattr__(self, name, standard_deviation(name, value))
         if self.range_rate_correlation is not None:
             _check_correlation(self)
+        _check_kinds(self)
         told = (self.height_m, self.pressure_altitude_m, self.atmosphere)
         if self.site is None and any(each is not None for each in told):
             raise UsageError(
@@ -128,6 +142,12 @@ class Radar:
 
     def components(self, motion: Motion) -> tuple[Component, ...]:
         """The formulas of what is measured, for states of `motion`."""
+        up = [name for name in self.names if name in _UPWARD]
+        if up and motion.dims < 3:
+            raise UsageError(
+                f"a radar with {up[0]} cannot see a motion in {motion.dims} dimensions",
+                next_step=f"use a motion with dims=3, or a radar without {', '.join(up)}",
+            )
         return tuple(self._component(name, motion) for name in self.names)
 
     def _component(self, name: str, motion: Motion) -> Component:
@@ -226,9 +246,24 @@ class Radar:
         return value
 
 
+def _check_kinds(radar: Radar) -> None:
+    """Something is measured, and a pose and a site are such."""
+    if not radar.names:
+        raise UsageError(
+            "a radar that measures nothing", next_step="give at least one standard deviation"
+        )
+    for name, kind in (("pose", Pose), ("site", Site)):
+        value = getattr(radar, name)
+        if not isinstance(value, kind | None):
+            raise UsageError(
+                f"{name}={value!r} is not a {kind.__name__}",
+                next_step=f"pass {name}=bs.{kind.__name__}(...)",
+            )
+
+
 def _check_correlation(radar: Radar) -> None:
     """It becomes a float or an array, and needs both of what it correlates."""
-    rho = np.asarray(radar.range_rate_correlation, dtype=float)
+    rho = np.asarray(as_number("range_rate_correlation", radar.range_rate_correlation))
     if radar.range_m is None or radar.range_rate_mps is None:
         raise UsageError("a correlation of range and range rate needs a radar that measures both")
     if not np.all(np.abs(rho) < 1.0):
@@ -237,18 +272,6 @@ def _check_correlation(radar: Radar) -> None:
             why="it must lie between -1 and 1",
         )
     object.__setattr__(radar, "range_rate_correlation", rho if rho.ndim else float(rho))
-
-
-def standard_deviation(name: str, value: Any) -> Any:
-    """The value as a float or an array; UsageError where it is not positive."""
-    sigma = float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
-    if not np.all(np.asarray(sigma) > 0):
-        raise UsageError(
-            f"{name}={value!r} is not a standard deviation",
-            why="it must be positive",
-            next_step=f"leave {name} out if the sensor does not measure it",
-        )
-    return sigma
 
 
 def Bearings(*, azimuth_deg: Any, pose: Pose | None = None) -> Radar:
