@@ -64,3 +64,48 @@ def test_a_pose_takes_lists_of_whole_numbers():
         radar = bs.Radar(range_m=10, azimuth_deg=1, elevation_deg=1, pose=pose)
         means.append(bs.run("ducm", LOOSE, radar, z, dt=1.0).mean)
     np.testing.assert_array_equal(*means)
+
+
+RADAR = bs.Radar(range_m=30, azimuth_deg=1.0, elevation_deg=1.0)
+PLOTS = np.tile([5000.0, 0.5, 0.1], (4, 6, 1))
+ENDLESS = np.where(np.arange(72).reshape(4, 6, 3) == 40, np.inf, PLOTS)  # run 2, scan 1, azimuth
+WRONG_RUNS = {
+    "one plot only": ({"plots": PLOTS[0, 0]}, r"shape \(3,\)"),
+    "too few components": ({"plots": PLOTS[..., :2]}, "the sensor measures range_m"),
+    "no scans": ({"plots": PLOTS[:, :0]}, r"\(runs, scans, 3\) is needed"),
+    "words": ({"plots": "plots"}, "is not a number"),
+    "infinity": ({"plots": ENDLESS}, r"azimuth_rad is inf\n  at:   run 2, scan 1"),
+    "dt backwards": ({"dt": -4.0}, "time runs forward"),
+    "dt unknown": ({"dt": np.full((4, 6), np.nan)}, "time runs forward"),
+    "dt without end": ({"dt": np.inf}, "time runs forward"),
+    "dt of other scans": ({"dt": np.ones((1, 5))}, r"give a number, \(1, 6\)"),
+    "dt with one axis": ({"dt": np.ones(6)}, r"give a number, \(1, 6\)"),
+    "start of other states": ({"start": bs.Gaussian(np.zeros(4), np.eye(4))}, "vz_mps"),
+    "start no Gaussian": ({"start": np.zeros(6)}, "Gaussian\\(mean, cov\\) of 6"),
+    "two of one scan": ({"plots": PLOTS[:, :1], "start": "two plots"}, "of 1 scans"),
+    "two at once": ({"dt": 0.0, "start": "two plots"}, "one instant"),
+    "no spread": ({"speed_mps": 0.0}, "positive speed_mps"),
+    "motion": ({"motion": None}, "the motion is a NoneType"),
+    "sensor": ({"sensor": LOOSE}, "the sensor is a ConstantVelocity"),
+    "name": ({"name": None}, "there is no filter None"),
+    "noise of other runs": (
+        {"sensor": bs.Radar(range_m=[1.0, 2.0], azimuth_deg=1.0, elevation_deg=1.0)},
+        "of 4 runs",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_RUNS)
+def test_a_wrong_run_is_refused_before_it_starts(name):
+    changes, said = WRONG_RUNS[name]
+    call = {"name": "ekf", "motion": LOOSE, "sensor": RADAR, "plots": PLOTS, "dt": 4.0} | changes
+    with pytest.raises(bs.UsageError, match=said):
+        bs.run(**call)
+
+
+def test_a_smoother_wants_time_forward_and_an_estimate():
+    estimate = bs.run("ekf", LOOSE, RADAR, PLOTS, dt=4.0)
+    with pytest.raises(bs.UsageError, match="time runs forward"):
+        bs.smooth(estimate, LOOSE, -4.0)
+    with pytest.raises(bs.UsageError, match="cannot be smoothed"):
+        bs.smooth(None, LOOSE)

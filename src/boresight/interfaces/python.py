@@ -14,7 +14,7 @@ from boresight.filters.recursion import Estimate, Recursion, run_recursion
 from boresight.filters.smoother import smooth as smooth_lanes
 from boresight.filters.start import SPEED_MPS, two_plots
 from boresight.filters.stream import Stream
-from boresight.interfaces import door
+from boresight.interfaces import door, given
 from boresight.maths import Gaussian
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
@@ -69,18 +69,20 @@ def run(
         as the filter took it, 0 up to the scan of a start from plots.
 
     Raises:
-        UsageError: an unknown name or setting, or shapes that do not fit.
+        UsageError: an unknown name or setting, shapes that do not fit, an infinite plot, time
+            that goes backwards.
     """
-    z = np.asarray(getattr(plots, "z", plots), dtype=float)
-    steps = getattr(plots, "dt", None) if dt is None else dt
-    if steps is None:
-        raise UsageError("the plots carry no dt", next_step="pass dt= in seconds")
+    given.models(motion, sensor)
+    recursion = catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor)
+    z = given.plots(getattr(plots, "z", plots), sensor)
+    steps = given.steps(getattr(plots, "dt", None) if dt is None else dt, *z.shape[:2])
+    given.fit(recursion, *z.shape[:2])
     if isinstance(sensor, Radar):
         z = sensor.without_air(z)
-    recursion = catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor)
     prior = getattr(plots, "prior", None) if start is None else start
-    if not isinstance(prior, Gaussian):
+    if prior is None or isinstance(prior, str):
         prior, z, steps = _start_from_plots(prior or "one plot", z, steps, recursion, speed_mps)
+    prior = given.start(prior, motion)
     found = run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
     return replace(found, others=found.others | {"dt": steps})
 
@@ -109,18 +111,17 @@ def smooth(
     Raises:
         UsageError: the estimate lacks mean, cov or dt, or shapes do not fit.
     """
-    given = estimate.others | ({} if dt is None else {"dt": getattr(dt, "dt", dt)})
-    lacking = [name for name in ("mean", "cov", "dt") if given.get(name) is None]
+    told = getattr(estimate, "others", {}) | ({} if dt is None else {"dt": getattr(dt, "dt", dt)})
+    lacking = [name for name in ("mean", "cov", "dt") if told.get(name) is None]
     if lacking:
         raise UsageError(
             f"an estimate without {lacking[0]!r} cannot be smoothed",
             next_step="pass dt= in seconds" if lacking[0] == "dt" else "run with it in outputs",
         )
-    filtered = Gaussian(given["mean"], given["cov"])
-    smoothed = smooth_lanes(
-        filtered, given["dt"], motion, linearisation=linearisation, threads=threads
-    )
-    return replace(estimate, others=smoothed._asdict() | {"dt": given["dt"]})
+    filtered = Gaussian(told["mean"], told["cov"])
+    steps = given.steps(told["dt"], *filtered.mean.shape[:2]) if filtered.mean.ndim == 3 else 0.0
+    smoothed = smooth_lanes(filtered, steps, motion, linearisation=linearisation, threads=threads)
+    return replace(estimate, others=smoothed._asdict() | {"dt": steps})
 
 
 def _start_from_plots(
@@ -132,11 +133,20 @@ def _start_from_plots(
         raise UsageError(
             f"no start {how!r}", next_step=f"use a Gaussian, or {' or '.join(_STARTS)}"
         )
+    if z.shape[1] < used or not speed_mps > 0:
+        raise UsageError(
+            f"no start from {how} of {z.shape[1]} scans with speed_mps={speed_mps!r}",
+            next_step="give the start: start=Gaussian(mean, cov), and a positive speed_mps",
+        )
     rows = np.shape(dt)[0] if np.ndim(dt) else 1
     steps = np.array(np.broadcast_to(np.asarray(dt, dtype=float), (rows, z.shape[1])))
     models = recursion.motion, recursion.sensor
     if used == 1:
         prior = recursion.method.start(z[:, 0], *models, speed_mps=speed_mps)
+    elif not np.all(steps[:, 1] > 0):
+        raise UsageError(
+            "no velocity from two plots of one instant", next_step='start from "one plot"'
+        )
     else:
         prior = two_plots(z[:, 0], z[:, 1], steps[:, 1], *models)
     rest = z.copy()

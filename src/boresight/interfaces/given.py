@@ -1,0 +1,88 @@
+"""What a user gives the verbs `run` and `smooth`, made plain arrays and checked once."""
+
+from typing import Any
+
+import numpy as np
+
+from boresight.errors import UsageError
+from boresight.filters.recursion import Recursion
+from boresight.maths import Gaussian
+from boresight.models.checks import as_number
+from boresight.models.motion import Motion
+from boresight.models.sensors import Sensor
+
+Array = Any
+
+
+def models(motion: Any, sensor: Any) -> None:
+    """UsageError where a motion is none, or a sensor."""
+    for value, name, role in ((motion, "motion", Motion), (sensor, "sensor", Sensor)):
+        needed = [each for each in role.__dict__ if not each.startswith("_")]
+        if not all(hasattr(value, each) for each in needed):
+            raise UsageError(
+                f"the {name} is a {type(value).__name__}",
+                next_step="pass run(name, motion, sensor, plots), such as bs.ConstantVelocity(...) "
+                "and bs.Radar(...)",
+            )
+
+
+def plots(z: Any, sensor: Sensor) -> Array:
+    """Plots (runs, scans, k) as an array; NaN is a missing component, infinity a mistake."""
+    array, names = np.asarray(as_number("plots", z)), sensor.names
+    if array.ndim != 3 or array.shape[1] < 1 or array.shape[2] != len(names):
+        raise UsageError(
+            f"plots have shape {array.shape}; (runs, scans, {len(names)}) is needed",
+            why=f"the sensor measures {', '.join(names)}",
+        )
+    if np.isinf(array).any():
+        run, scan, component = np.argwhere(np.isinf(array))[0]
+        raise UsageError(
+            f"{names[component]} is {array[run, scan, component]}",
+            where=f"run {run}, scan {scan}",
+            next_step="give NaN where a component was not measured",
+        )
+    return array
+
+
+def steps(dt: Any, runs: int, scans: int) -> Array:
+    """Seconds before each scan: a number, or an array with an axis of runs and one of scans."""
+    if dt is None:
+        raise UsageError("the plots carry no dt", next_step="pass dt= in seconds")
+    array = np.asarray(as_number("dt", dt))
+    fits = array.ndim == 2 and array.shape[0] in {1, runs} and array.shape[1] in {1, scans}
+    if array.ndim and not fits:
+        raise UsageError(
+            f"dt has shape {array.shape}",
+            next_step=f"give a number, (1, {scans}), ({runs}, 1) or ({runs}, {scans})",
+        )
+    wrong = array[~((array >= 0.0) & np.isfinite(array))]
+    if wrong.size:
+        raise UsageError(
+            f"dt={wrong.flat[0]} s: time runs forward, in finite steps",
+            next_step="sort the plots by time; dt is 0 where two came at once",
+        )
+    return array
+
+
+def start(given: Any, motion: Motion) -> Gaussian:
+    """A start in the motion's own states."""
+    n = len(motion.names)
+    if not isinstance(given, tuple) or len(given) != 2 or np.shape(given[0])[-1:] != (n,):
+        raise UsageError(
+            "the start is not one of the motion",
+            why=f"its states are {', '.join(motion.names)}",
+            next_step=f'pass Gaussian(mean, cov) of {n} states, "one plot" or "two plots"',
+        )
+    return Gaussian(*(np.asarray(as_number("start", each)) for each in given))
+
+
+def fit(recursion: Recursion, runs: int, scans: int) -> None:
+    """UsageError where a number of the models is for other runs or scans than the plots are."""
+    for name, (value, leaf) in recursion.models().items():
+        shape = np.shape(value)
+        lead = shape[: len(shape) - len(leaf.shape)]
+        if any(have not in {1, want} for have, want in zip(lead, (runs, scans), strict=False)):
+            raise UsageError(
+                f"{name} has shape {shape}, and the plots are of {runs} runs and {scans} scans",
+                next_step="put runs first and scans second, each 1 long where it is constant",
+            )
