@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import boresight as bs
+from boresight import catalogue
 from boresight.errors import UsageError
 from boresight.experiments.metrics import anees, rmse, rmse_per_run
 from boresight.experiments.scenario import lookup
@@ -235,20 +236,28 @@ def test_a_covariance_stays_positive_where_the_textbook_s_does_not(sd_mps, linea
     assert sd_mps < 1e5 or np.linalg.eigvalsh(theirs[1]).min() < 0.0
 
 
-def test_smoothed_errors_are_smaller_and_known():
-    """kashyap's Set 2, EKF, 100 runs: paired by run; ANEES within 4 standard errors (1 in 16,000).
+ANY = [
+    pytest.param(n, marks=[pytest.mark.slow] * (n != "ekf")) for n in catalogue.names() if n != "kf"
+]
 
-    The standard error is that of averages over a run; smoothed it is about 0.012.
+
+@pytest.mark.parametrize("name", ANY)
+def test_smoothed_errors_are_smaller_and_known(name):
+    """kashyap's Set 2, 100 runs: paired by run; ANEES within 4 standard errors (1 in 16,000).
+
+    The standard error is that of averages over a run; smoothed it is about 0.012. Noise that is
+    taken from the plot biases each estimate the same way, which a smoother adds up: 1.03 to 1.08.
     """
     truth, plots = bs.simulate(SET2, runs=100, seed=5)
-    before = bs.run("ekf", SET2.motion, SET2.sensor, plots)
+    before = bs.run(name, SET2.motion, SET2.sensor, plots)
     ours = bs.smooth(before, SET2.motion)
     for of in ("position", "velocity"):
         pairs = rmse_per_run(before, truth, of=of) - rmse_per_run(ours, truth, of=of)
         assert np.mean(pairs) > 5 * np.std(pairs) / np.sqrt(len(pairs))
         assert rmse(ours, truth, of=of) < 0.7 * rmse(before, truth, of=of)
     total = anees(ours, truth)
-    assert abs(total.value - 1.0) < 4 * total.standard_error
+    beyond = 0.05 if name in ("cmkf", "cmkf-d", "ucm", "mucm", "mmse") else 0.0
+    assert abs(total.value - 1.0) < beyond + 4 * total.standard_error
     assert total.low < total.value < total.high
 
 
