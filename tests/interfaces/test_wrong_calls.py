@@ -109,3 +109,53 @@ def test_a_smoother_wants_time_forward_and_an_estimate():
         bs.smooth(estimate, LOOSE, -4.0)
     with pytest.raises(bs.UsageError, match="cannot be smoothed"):
         bs.smooth(None, LOOSE)
+
+
+WRONG_SETTINGS = [
+    ("mekf", {"mu": 3}),
+    ("mekf", {"order": "elevation_rad"}),
+    ("iekf", {"iterations": "a"}),
+    ("iekf", {"iterations": 2.5}),
+    ("iplf", {"iterations": 3.5}),
+    ("ukf", {"alpha": "x"}),
+    ("ukf", {"beta": np.nan}),
+    ("ducm", {"conversion": 3}),
+    ("ducm", {"scale_output": "no"}),
+    ("line-of-sight", {"components": True}),
+]
+
+
+@pytest.mark.parametrize(("name", "setting"), WRONG_SETTINGS)
+def test_a_setting_of_another_kind_is_refused_with_its_default(name, setting):
+    (key,) = setting
+    with pytest.raises(bs.UsageError, match=f"is no setting of {name}\n  next: .*{key}="):
+        bs.stream(name, LOOSE, RADAR, **setting)
+
+
+@pytest.mark.parametrize("targets", [0, -1, "two", 1.5])
+def test_a_stream_holds_a_whole_number_of_targets(targets):
+    with pytest.raises(bs.UsageError, match="no number of targets"):
+        bs.stream("ekf", LOOSE, RADAR, targets=targets)
+
+
+@pytest.mark.parametrize("name", ["ekf", "line-of-sight"])
+def test_a_live_filter_refuses_what_is_no_plot_no_time_and_no_state(name):
+    step = bs.stream(name, LOOSE, RADAR)
+    state = step.start(PLOTS[0, 0])
+    for plot in (PLOTS[0, 0, :2], PLOTS[0], "plot", None):
+        with pytest.raises(bs.UsageError, match=r"a plot|is not a number"):
+            step.start(plot)
+    for dt in (np.inf, np.nan, -1.0, "soon", None, np.ones(2)):
+        with pytest.raises(bs.UsageError, match="does not go backwards"):
+            step(state, PLOTS[0, 1], dt)
+    with pytest.raises(bs.UsageError, match="other sizes, or none"):
+        step(None, PLOTS[0, 1], 1.0)
+
+
+@pytest.mark.parametrize("name", ["ekf", "line-of-sight"])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_live_start_from_half_a_plot_says_that_it_is_none(name, wrong):
+    step = bs.stream(name, LOOSE, RADAR, targets=2)
+    state = step.start(np.array([[5000.0, 0.5, 0.1], [5000.0, wrong, 0.1]]))
+    assert state.status.tolist() == [bs.Status.OK, bs.Status.NOT_STARTED]
+    assert np.isfinite(state.mean[0]).all()

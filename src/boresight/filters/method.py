@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from inspect import signature
+from math import isfinite
 from typing import Any
 
 from boresight.errors import UsageError
@@ -35,14 +36,20 @@ class Filter:
     settings: tuple[tuple[str, Any], ...] = ()
 
     def with_settings(self, **settings: Any) -> "Filter":
-        """The same filter with settings changed; unknown ones raise UsageError."""
+        """The same filter with settings changed; UsageError where one is unknown or of no use."""
         parameters = signature(self.formula).parameters.values()
-        known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.name != "correct"]
-        for name in settings:
+        usual = {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY}
+        known = [name for name in usual if name != "correct"]
+        for name, value in settings.items():
             if name not in known:
                 raise UsageError(
                     f"{self.name} has no setting {name!r}",
                     next_step=f"use {', '.join(known)}" if known else "it has no settings",
+                )
+            if not _is_like(value, usual[name]):
+                raise UsageError(
+                    f"{name}={value!r} is no setting of {self.name}",
+                    next_step=f"give something like {name}={usual[name]!r}, its default",
                 )
         hashable = {k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()}
         return replace(self, settings=tuple(sorted((dict(self.settings) | hashable).items())))
@@ -57,3 +64,14 @@ class Filter:
     def recursion(self, motion: Motion, sensor: Sensor) -> Recursion:
         """Predict and update with this filter, ready to run over lanes."""
         return Recursion(self.method, motion, sensor)
+
+
+def _is_like(value: Any, usual: Any) -> bool:
+    """Whether a setting is of the kind of its default; where that is None, a whole number."""
+    if isinstance(value, bool) or isinstance(usual, bool):
+        return isinstance(value, bool) and isinstance(usual, bool)
+    if isinstance(usual, float):
+        return isinstance(value, int | float) and isfinite(value)
+    if isinstance(usual, tuple):
+        return isinstance(value, list | tuple) and all(isinstance(each, str) for each in value)
+    return isinstance(value, int | None if usual is None else type(usual))

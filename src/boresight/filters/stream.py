@@ -20,9 +20,11 @@ from boresight.filters.recursion import SUMMARY, Recursion
 from boresight.filters.start import SPEED_MPS
 from boresight.lanes import BLOCK, Kernel, Rate, States, Symmetric
 from boresight.maths import Gaussian
+from boresight.models.checks import as_number
 from boresight.models.parameters import rate_of
 
 Array = Any
+_FOREVER = float("inf")
 
 
 class StreamState:
@@ -74,6 +76,10 @@ class Stream:
     """A filter for one target (targets=None) or a fixed number of them, fed plot by plot."""
 
     def __init__(self, recursion: Recursion, targets: int | None = None) -> None:
+        if targets is not None and (not isinstance(targets, int) or targets < 1):
+            raise UsageError(
+                f"targets={targets!r} is no number of targets", next_step="leave it out for one"
+            )
         self.recursion, self.targets = recursion, targets
         self._lanes = 1 if targets is None else targets
         self._components = len(recursion.sensor.names)
@@ -117,7 +123,7 @@ class Stream:
         """Begin from a plot (k,) or (targets, k), or from a Gaussian."""
         recursion, prior = self.recursion, plot
         if not isinstance(plot, Gaussian):
-            rows = np.reshape(plot, (-1, self._components))
+            rows = self._first_rows(plot)
             models = recursion.motion, recursion.sensor
             prior = recursion.method.start(rows, *models, speed_mps=speed_mps)
         n = len(recursion.motion.names)
@@ -132,12 +138,21 @@ class Stream:
         self._tell(buffer, prior)
         return StreamState(self, buffer)
 
+    def _first_rows(self, plot: Array) -> Array:
+        """The plot of each target as a row."""
+        rows = np.asarray(as_number("plot", plot))
+        if rows.shape[-1:] != (self._components,) or rows.size != self._lanes * self._components:
+            raise self._wrong(plot)
+        return np.where(np.isinf(rows), np.nan, rows).reshape(self._lanes, self._components)
+
     def _tell(self, buffer: Any, prior: Gaussian) -> None:
-        """Before its first plot a target is where its start says."""
-        if self._written == "summary":
-            return
+        """Before its first plot a target is where its start says, if that says where."""
         n = len(self.recursion.motion.names)
         told = self._rows(buffer)
+        known = np.isfinite(prior.mean).all(-1) & np.isfinite(prior.cov).all((-2, -1))
+        told[:, SUMMARY.index("status")] = np.where(known, Status.OK, Status.NOT_STARTED)
+        if self._written == "summary":
+            return
         told[:, len(SUMMARY) : len(SUMMARY) + n] = prior.mean
         told[:, len(SUMMARY) + n :] = Symmetric(n).pack(prior.cov)
 
@@ -149,13 +164,20 @@ class Stream:
             plot: (k,) or (targets, k), SI units and radians, NaN where missing.
             dt: seconds since that state, not negative.
         """
-        if not dt >= 0.0:
+        try:
+            runs_forward = 0.0 <= dt < _FOREVER
+        except (TypeError, ValueError):
+            runs_forward = False
+        if not runs_forward:
             raise UsageError(
-                f"dt={dt!r} s: time does not go backwards",
+                f"dt={dt!r} s: time does not go backwards, nor without end",
                 next_step="keep the states of earlier plots and step again from the one before",
             )
-        if type(state.buffer) is not self._buffer_type:
-            raise UsageError("the state is that of a stream with other sizes")
+        if not isinstance(state, StreamState) or type(state.buffer) is not self._buffer_type:
+            raise UsageError(
+                "the state is that of a stream with other sizes, or none",
+                next_step="begin with state = stream.start(plot)",
+            )
         buffer = self._buffer_type()
         self._accept(buffer, plot, dt)
         if self._kernel.code is None:
