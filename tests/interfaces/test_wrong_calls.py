@@ -159,3 +159,49 @@ def test_a_live_start_from_half_a_plot_says_that_it_is_none(name, wrong):
     state = step.start(np.array([[5000.0, 0.5, 0.1], [5000.0, wrong, 0.1]]))
     assert state.status.tolist() == [bs.Status.OK, bs.Status.NOT_STARTED]
     assert np.isfinite(state.mean[0]).all()
+
+
+DOPPLER = {"transmitted_hz": 1e4, "speed_mps": 10.0, "sigma_hz": 1.0, "sigma_deg": 2.5}
+WRONG_DOPPLER = [
+    {"sigma_hz": 0.0},
+    {"sigma_deg": -2.0},
+    {"sigma_deg": 5000.0},
+    {"transmitted_hz": -5.0},
+    {"propagation_mps": 0.0},
+    {"drift_mps": -1.0},
+    {"speed_mps": None},
+]
+
+
+@pytest.mark.parametrize("wrong", WRONG_DOPPLER)
+def test_a_number_that_no_doppler_has_is_named(wrong):
+    heard, bearings = np.full((2, 5), 10050.0), np.full((2, 5), 0.3)
+    with pytest.raises(bs.UsageError, match=f"{next(iter(wrong))}="):
+        bs.track_range_rate(heard, bearings, **DOPPLER | wrong)
+
+
+WRONG_CONVERSIONS = {
+    "many turns": ({"sigma": [30.0, 30.0, 0.1]}, "in an angle at most pi"),
+    "words": ({"z": "plot"}, "z='plot' is not a number"),
+    "name": ({"name": None}, "there is no conversion None"),
+    "point": ({"prediction": np.zeros(3)}, "a prediction that is a ndarray"),
+    "negative": ({"prediction": bs.Gaussian(np.ones(3), -np.eye(3))}, "negative variance"),
+    "negative place": ({"prediction": bs.Given(PLOTS[0, 0], -np.ones(3))}, "negative variance"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_CONVERSIONS)
+def test_a_conversion_that_cannot_be_is_refused(name):
+    changes, said = WRONG_CONVERSIONS[name]
+    call = {"name": "ducm", "z": PLOTS[0, 0], "sigma": [30.0, 0.1, 0.1]} | changes
+    with pytest.raises(bs.UsageError, match=said):
+        bs.convert(**call)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [({"runs": 0}, "runs=0"), ({"assume": {"dt_s": "x"}}, "as it is: --assume dt_s=1.0")],
+)
+def test_a_paper_is_not_repeated_by_halves(wrong, said):
+    with pytest.raises(bs.UsageError, match=said):
+        bs.reproduce("bordonaro", **wrong)

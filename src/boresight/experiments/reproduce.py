@@ -1,5 +1,6 @@
 """Every table, figure and claim of a paper again, each with a verdict."""
 
+import json
 from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from importlib import import_module
@@ -43,9 +44,13 @@ def reproduce(
         (and `parts` where it has some); `figures`, the files written; `seed`.
 
     Raises:
-        UsageError: an unknown paper or assumption.
+        UsageError: an unknown paper or assumption, or fewer runs than one.
         MissingExtraError: figures are asked for and matplotlib is not installed.
     """
+    if runs is not None and runs < 1:
+        raise UsageError(
+            f"runs={runs} is less than one", next_step="leave it out for the paper's own number"
+        )
     keys = _PAPERS if key == "all" else (_known(key),)
     folder = None if output is None else Path(output)
     tables = [_assuming(name, assume or {}) for name in keys]
@@ -83,7 +88,11 @@ def _assuming(key: str, assume: Mapping[str, Any]) -> dict[str, Any]:
                 next_step=f"use {', '.join(table['assumed'])}",
             )
         if _kind(value) != _kind(usual):
-            raise UsageError(f"{name}={value!r} cannot stand for {key}'s {name}={usual!r}")
+            raise UsageError(
+                f"{name}={value!r} cannot stand for {key}'s {name}={usual!r}",
+                why="it must be of the same kind: a number, a word, or a list of them",
+                next_step=f"as it is: --assume {name}={json.dumps(usual)}",
+            )
     return table | {"assumed": table["assumed"] | dict(assume)}
 
 

@@ -81,7 +81,10 @@ class Scenario:
                 next_step=f"use {', '.join(get_args(Begin))}",
             )
         if self.scans < 1 or not self.dt_s > 0:
-            raise UsageError(f"scenario {self.name!r} has scans={self.scans}, dt_s={self.dt_s}")
+            raise UsageError(
+                f"scenario {self.name!r} has scans={self.scans}, dt_s={self.dt_s}",
+                why="there must be at least one scan, and time between scans",
+            )
 
     @property
     def prior(self) -> Gaussian:

@@ -18,6 +18,7 @@ import numpy as np
 from boresight.errors import UsageError
 from boresight.lanes import Kernel, Rate, Scalar, make_kernel, pack_states, trace
 from boresight.maths import Gaussian, missing, select, wrap
+from boresight.models.checks import as_number, not_negative, positive, standard_deviation
 from boresight.models.conversions import lookup
 from boresight.models.doppler import NULLIFICATIONS, closing_speed, nullify
 from boresight.models.parameters import rate_of
@@ -77,18 +78,18 @@ def track_range_rate(
         bearing: where `ducm` takes the noise: at the filtered bearing, or at the one before.
 
     Raises:
-        UsageError: an unknown method or source, or arrays that do not fit.
+        UsageError: an unknown method or source, arrays that do not fit, or a number that cannot be.
     """
     _check(method, bearing, received_hz, bearings_rad)
     lanes, scans = np.shape(received_hz)
     settings = {
-        "transmitted": transmitted_hz,
-        "speed": speed_mps,
-        "sigma_hz": sigma_hz,
-        "sigma": np.radians(sigma_deg),
-        "propagation": propagation_mps,
-        "drift": drift_mps,
-        "turn": np.radians(drift_deg),
+        "transmitted": positive("transmitted_hz", transmitted_hz),
+        "speed": as_number("speed_mps", speed_mps),
+        "sigma_hz": standard_deviation("sigma_hz", sigma_hz),
+        "sigma": np.radians(standard_deviation("sigma_deg", sigma_deg)),
+        "propagation": positive("propagation_mps", propagation_mps),
+        "drift": not_negative("drift_mps", drift_mps),
+        "turn": np.radians(not_negative("drift_deg", drift_deg)),
     }
     rated = {name: rate_of(name, value, Scalar()) for name, value in settings.items()}
     kernel = _kernel(method, bearing, tuple((name, rate) for name, (rate, _) in rated.items()))

@@ -7,6 +7,7 @@ import numpy as np
 from boresight.errors import UsageError
 from boresight.maths import Gaussian
 from boresight.models import conversions
+from boresight.models.checks import as_number
 from boresight.models.polar import Given, polar_moments
 from boresight.models.sensors import Pose
 
@@ -40,15 +41,18 @@ def convert(
     Raises:
         UsageError: an unknown name, shapes that do not fit, a sigma that is no standard deviation.
     """
-    z, sigma = np.asarray(z, dtype=float), np.asarray(sigma, dtype=float)
+    z, sigma = np.asarray(as_number("z", z)), np.asarray(as_number("sigma", sigma))
     d = z.shape[-1] if z.ndim else 0
     if d not in {2, 3} or sigma.shape[-1:] != (d,):
         raise UsageError(
             f"z {z.shape} and sigma {sigma.shape} are not plots and their standard deviations",
             next_step="give both with 2 numbers (range, azimuth) or 3 (and elevation) at the end",
         )
-    if not np.all((sigma >= 0) & np.isfinite(sigma)):
-        raise UsageError("sigma must be finite and not negative", why="it is a standard deviation")
+    if not np.all((sigma >= 0) & np.isfinite(sigma)) or np.any(sigma[..., 1:] > np.pi):
+        raise UsageError(
+            "sigma must be finite and not negative, and in an angle at most pi",
+            why="it holds standard deviations in metres and radians",
+        )
     given = _polar(prediction, pose, d)
     z = np.where(np.isfinite(z).all(-1, keepdims=True), z, np.nan)
     if given is None:
@@ -82,16 +86,25 @@ def _polar(prediction: Gaussian | Given | None, pose: Pose | None, d: int) -> Gi
     if prediction is None:
         return None
     if isinstance(prediction, Given):
-        if {np.shape(each)[-1:] for each in prediction[:2]} == {(d,)}:
-            return prediction
-        raise UsageError(f"the place that is given has not {d} means and {d} variances at the end")
-    mean, cov = (np.asarray(each, dtype=float) for each in prediction)
+        if {np.shape(each)[-1:] for each in prediction[:2]} != {(d,)}:
+            raise UsageError(
+                f"the place that is given has not {d} means and {d} variances at the end"
+            )
+        _not_negative(prediction.variances)
+        return prediction
+    if not isinstance(prediction, tuple) or len(prediction) != 2:
+        raise UsageError(
+            f"a prediction that is a {type(prediction).__name__}",
+            next_step="give bs.Gaussian(mean, cov) or bs.Given(mean, variances)",
+        )
+    mean, cov = (np.asarray(as_number("prediction", each)) for each in prediction)
     if mean.shape[-1:] < (d,) or cov.shape[-2:] != 2 * mean.shape[-1:]:
         raise UsageError(
             f"mean {mean.shape} and cov {cov.shape} predict no position in {d} dimensions",
             next_step=f"give mean (..., n) and cov (..., n, n), n at least {d}, positions first",
         )
     mean, cov = mean[..., :d], cov[..., :d, :d]
+    _not_negative(np.diagonal(cov, 0, -2, -1))
     if pose is not None:
         turn = pose.rotation[..., :d, :d]
         mean = np.einsum("...ij,...j->...i", turn, mean - pose.position_m[..., :d])
@@ -99,3 +112,8 @@ def _polar(prediction: Gaussian | Given | None, pose: Pose | None, d: int) -> Gi
     mean, flat = _component_first(mean, cov.reshape(*cov.shape[:-2], d * d))
     found = polar_moments(mean, flat.reshape(d, d, *mean.shape[1:]))
     return Given(np.moveaxis(found.mean, 0, -1), np.moveaxis(found.variances, 0, -1))
+
+
+def _not_negative(variances: Array) -> None:
+    if np.any(np.asarray(variances) < 0):
+        raise UsageError("the prediction has a negative variance")

@@ -14,11 +14,14 @@ _HALF_TURN_DEG = 180.0
 def as_number(name: str, value: Any) -> Any:
     """The value as a float or an array of them; UsageError where it is neither."""
     try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+        given = np.asarray(value)
+        array = given.astype(float, copy=False) if given.dtype.kind in "biuf" else None
+    except ValueError:  # rows of different lengths
+        array = None
+    if array is None:
         raise UsageError(
             f"{name}={value!r} is not a number", next_step="give a number, or an array of them"
-        ) from None
+        )
     return array if array.ndim else float(array)
 
 
@@ -39,6 +42,14 @@ def standard_deviation(name: str, value: Any) -> Any:
             next_step=f"leave {name} out if the sensor does not measure it",
         )
     return sigma
+
+
+def positive(name: str, value: Any) -> Any:
+    """What must be positive and finite, as a float or an array."""
+    number = as_number(name, value)
+    if not np.all((np.asarray(number) > 0) & np.isfinite(number)):
+        raise UsageError(f"{name}={value!r} is not positive and finite")
+    return number
 
 
 def not_negative(name: str, value: Any) -> Any:

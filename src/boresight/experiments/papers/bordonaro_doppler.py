@@ -13,6 +13,7 @@ from boresight.experiments.scenario import FOOT_M
 from boresight.filters.own_doppler import track_range_rate
 from boresight.maths import Gaussian
 from boresight.maths.seeds import Stream, normals
+from boresight.models.checks import positive
 from boresight.models.doppler import closing_speed, received_frequency
 
 Array = Any
@@ -56,7 +57,7 @@ def echo(
 
 def _sound(printed: dict[str, Any], assumed: dict[str, Any]) -> tuple[float, float]:
     """Frequency sent, Hz, and speed of the wave, m/s."""
-    return printed["transmitted_hz"], assumed["propagation_mps"]
+    return printed["transmitted_hz"], positive("propagation_mps", assumed["propagation_mps"])
 
 
 def significance(seen: Echo, bearing: Any) -> Any:
