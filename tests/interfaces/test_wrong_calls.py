@@ -84,7 +84,7 @@ WRONG_RUNS = {
     "start no Gaussian": ({"start": np.zeros(6)}, "Gaussian\\(mean, cov\\) of 6"),
     "two of one scan": ({"plots": PLOTS[:, :1], "start": "two plots"}, "of 1 scans"),
     "two at once": ({"dt": 0.0, "start": "two plots"}, "one instant"),
-    "no spread": ({"speed_mps": 0.0}, "positive speed_mps"),
+    "no spread": ({"speed_mps": 0.0}, "speed_mps=0.0 is not positive"),
     "motion": ({"motion": None}, "the motion is a NoneType"),
     "sensor": ({"sensor": LOOSE}, "the sensor is a ConstantVelocity"),
     "name": ({"name": None}, "there is no filter None"),

@@ -18,6 +18,7 @@ from boresight.interfaces import door, given
 from boresight.maths import Gaussian
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
+from boresight.models.checks import positive
 from boresight.models.motion import Motion
 from boresight.models.sensors import Radar, Sensor
 
@@ -133,11 +134,12 @@ def _start_from_plots(
         raise UsageError(
             f"no start {how!r}", next_step=f"use a Gaussian, or {' or '.join(_STARTS)}"
         )
-    if z.shape[1] < used or not speed_mps > 0:
+    if z.shape[1] < used:
         raise UsageError(
-            f"no start from {how} of {z.shape[1]} scans with speed_mps={speed_mps!r}",
-            next_step="give the start: start=Gaussian(mean, cov), and a positive speed_mps",
+            f"no start from {how} of {z.shape[1]} scans",
+            next_step="give the start: start=Gaussian(mean, cov)",
         )
+    positive("speed_mps", speed_mps)
     rows = np.shape(dt)[0] if np.ndim(dt) else 1
     steps = np.array(np.broadcast_to(np.asarray(dt, dtype=float), (rows, z.shape[1])))
     models = recursion.motion, recursion.sensor
