@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.stats import beta
 
 from boresight import catalogue
 from boresight.experiments.metrics import chi_square_bounds
@@ -169,23 +168,22 @@ def through(runs, seed, components, accel):
     return finite, lost
 
 
-def clopper_pearson(count, runs, level=0.99):
-    a = (1 - level) / 2
-    low = beta.ppf(a, count, runs - count + 1) if count else 0.0
-    return low, beta.ppf(1 - a, count + 1, runs - count)
+# Components, acceleration, and the share of runs lost, at most. Measured with 100,000 runs: 0.030,
+# 0.023, 0.021 and 0.0012, with standard errors of 2 % of them, 9 % of the last.
+SHARES = [(1, 0.0, 0.035), (3, 0.0, 0.027), (5, 0.0, 0.025), (5, 1.0, 0.0018)]
 
 
-@pytest.mark.parametrize("components", [1, 5])
-@pytest.mark.parametrize("accel", [0.0, 1.0])
-def test_close_passes_stay_finite(components, accel):
+@pytest.mark.parametrize(("components", "accel", "most"), SHARES)
+def test_close_passes_stay_finite_and_few_are_lost(components, accel, most):
+    """4,000 runs: three standard errors more may be lost, one false alarm in 700."""
     finite, lost = through(4000, 3, components, accel)
     assert finite.all()
-    print(f"lost {lost.mean():.4f}, 99 % {clopper_pearson(lost.sum(), len(lost))}")  # noqa: T201
+    assert lost.mean() <= most + 3 * np.sqrt(most / 4000)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("components", "accel"), [(1, 0.0), (3, 0.0), (5, 0.0), (5, 1.0)])
-def test_a_hundred_thousand_random_geometries_stay_finite(components, accel):
+@pytest.mark.parametrize(("components", "accel", "most"), SHARES)
+def test_a_hundred_thousand_random_geometries_stay_finite(components, accel, most):
     finite, lost = through(100_000, 17, components, accel)
     assert finite.all()
-    print(f"lost {lost.mean():.5f}, 99 % {clopper_pearson(lost.sum(), len(lost))}")  # noqa: T201
+    assert lost.mean() <= most
