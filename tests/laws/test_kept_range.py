@@ -142,3 +142,12 @@ def test_noise_of_the_motion_is_that_of_the_place():
     expected = back @ motion.noise(1.0) @ back.T
     sd = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(after / np.outer(sd, sd), expected / np.outer(sd, sd), atol=1e-5)
+
+
+def test_right_overhead_an_azimuth_is_anything():
+    """Where it has no slope, a start is finite, and no more certain than any angle is."""
+    start = Gaussian(np.array([0.0, 0.0, 9e3, 5.0, 0.0, 0.0]), np.diag([1e4] * 3 + [9e2] * 3))
+    kept = KEEPS.begin(start, SPACE, POLAR)
+    np.testing.assert_allclose(kept["mean"][[0, 2]], [9e3, np.pi / 2], rtol=1e-6)
+    assert kept["cov"][1, 1] == pytest.approx(np.pi**2 / 3.0)
+    assert np.isfinite(kept["cov"]).all()

@@ -193,6 +193,7 @@ def test_a_start_from_a_plot_is_that_plot(components):
     start = one_plot(z, PLANE, PLANAR)
     state = method.begin(Gaussian(start.mean[0], start.cov[0]), PLANE, PLANAR)
     weights = np.exp(state["log_weights"]) / np.sum(np.exp(state["log_weights"]))
+    assert np.ptp(state["means"][:, 2]) < 1e-9  # it is the transverse velocity that is split
     mean = weights @ state["means"]
     np.testing.assert_allclose(mean, [4e4, 2.1, 0, 0], rtol=1e-12, atol=1e-9)
     variances = np.array([30.0, np.radians(0.8), 300.0, 300.0]) ** 2
@@ -220,6 +221,10 @@ def test_likelihood_is_that_of_the_mixture():
         total += w * np.exp(-quadratic / 2) / (2 * np.pi * np.sqrt(np.linalg.det(S)))
     assert surprise.loglik == pytest.approx(np.log(total), rel=1e-9)
     assert surprise.dof == 2
+    _, surprise = method.update(state, np.array([z[0], np.nan]), PLANE, PLANAR)
+    sd = np.sqrt(state["covs"][:, 0] + 30.0**2)
+    alone = np.log(weights @ norm.pdf(z[0], state["means"][:, 0], sd))
+    assert surprise.loglik == pytest.approx(alone, rel=1e-9)
 
 
 @pytest.mark.parametrize("motion", [PLANE, SPACE], ids=["plane", "space"])

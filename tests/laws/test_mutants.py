@@ -10,7 +10,8 @@ import pytest
 SCRIPT = Path(__file__).parents[2] / "scripts" / "mutate.py"
 
 
-def test_every_planted_fault_is_still_there_to_plant():
+def test_every_planted_fault_is_still_there_to_plant(monkeypatch):
+    monkeypatch.syspath_prepend(str(SCRIPT.parent))
     script = runpy.run_path(str(SCRIPT))
     assert len(script["FAULTS"]) >= 40
     for fault in script["FAULTS"]:

@@ -82,6 +82,32 @@ def test_posterior_linearisation_is_the_textbook(world, iterations, seed):
     close((post.nis, post.loglik), (once.nis, once.loglik))  # those of the prediction
 
 
+@worlds
+@pytest.mark.parametrize("name", ["ukf", "ckf", "iplf"])
+@given(seed=seeds)
+def test_points_on_both_sides_of_180_degrees_are_neighbours(name, world, seed):
+    """Half a turn of the world puts the seam of azimuths amid the points, and changes nothing."""
+    mean, cov, z, _ = drawn(world, seed)
+    mean[1] *= 1e-3
+    z[1] = np.arctan2(mean[1], mean[0]) + 0.01
+    half = np.diag([-1.0, -1.0, *[1.0] * (world.motion.dims - 2)])
+    half = np.kron(np.eye(2), half)
+    ahead = Entry(name).update(world, mean, cov, z)
+    z[1] -= np.pi
+    behind = Entry(name).update(world, half @ mean, half @ cov @ half, z)
+    close((half @ behind.mean, half @ behind.cov @ half, behind.nis), (*ahead[:2], ahead.nis))
+
+
+@pytest.mark.parametrize("name", ["ukf", "ckf", "iplf"])
+@given(seed=seeds)
+def test_a_missing_component_is_one_that_the_sensor_does_not_have(name, seed):
+    mean, cov, z, _ = drawn(World(SPACE, POLAR), seed)
+    lacking = World(SPACE, replace(POLAR, elevation_deg=None))
+    without = Entry(name).update(lacking, mean, cov, z[:2])
+    z[2] = np.nan
+    close(Entry(name).update(World(SPACE, POLAR), mean, cov, z)[:5], without[:5])
+
+
 @pytest.mark.parametrize("name", ["ukf", "ckf", "iplf"])
 @given(seed=seeds, dt=st.floats(0.5, 8.0))
 def test_a_motion_that_is_not_linear_is_predicted_by_points(name, seed, dt):
