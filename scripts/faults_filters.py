@@ -134,7 +134,7 @@ FAULTS = (
     ),
     *faults(
         "filters/own_doppler.py",
-        ("np.radians(sigma_deg)", "sigma_deg"),
+        ('np.radians(standard_deviation("sigma_deg", sigma_deg))', "sigma_deg"),
         ('state["spread"] + inputs["turn"] * inputs["turn"]', 'state["spread"]'),
         ('state["variance"] + inputs["drift"] * inputs["drift"]', 'state["variance"]'),
         ('heard if source == "filter" else 0.0, off, s2', "heard, off, s2"),

@@ -69,10 +69,13 @@ def test_the_bearing_before_serves_nearly_as_well():
     assert 1.0 < consistency < 1.2
 
 
-def test_one_scan_at_a_time_is_a_scalar_kalman_filter():
+@pytest.mark.parametrize(("drift_mps", "drift_deg"), [(0.0, 0.0), (0.4, 1.5)])
+def test_one_scan_at_a_time_is_a_scalar_kalman_filter(drift_mps, drift_deg):
     """By hand: a bearing filter, DUCM's variance at its prediction (40), and a weighted mean."""
     received, bearings = (x[:3, :5] for x in heard(4.0))
-    found = bs.track_range_rate(received, bearings, **SETUP, sigma_deg=4.0)
+    found = bs.track_range_rate(
+        received, bearings, **SETUP, sigma_deg=4.0, drift_mps=drift_mps, drift_deg=drift_deg
+    )
     s2, speed = np.radians(4.0) ** 2, SETUP["speed_mps"]
     closing = (received - 50e3) * 1500 / 100e3 - speed * np.cos(bearings) * np.exp(s2 / 2)
     sf2 = (5.0 * 1500 / 100e3) ** 2
@@ -80,6 +83,7 @@ def test_one_scan_at_a_time_is_a_scalar_kalman_filter():
         a, pa = bearings[lane, 0], s2
         mean, P = closing[lane, 0], found.variance[lane, 0]
         for k in range(1, 5):
+            P, pa = P + drift_mps**2, pa + np.radians(drift_deg) ** 2
             c = np.cos(2 * a)
             R = sf2 + speed**2 / 2 * (
                 (1 + c * np.exp(-2 * s2 - 2 * pa)) * np.exp(s2) - (1 + c * np.exp(-2 * pa))
