@@ -154,7 +154,7 @@ def lookup(name: str) -> Filter:
     """The filter of that name; UsageError with the nearest valid name if there is none."""
     if name in _FILTERS:
         return _FILTERS[name]
-    near = get_close_matches(str(name), _FILTERS, n=1)
+    near = get_close_matches(str(name).lower(), _FILTERS, n=1)
     raise UsageError(
         f"there is no filter {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
         next_step=f"use one of {', '.join(_FILTERS)}",

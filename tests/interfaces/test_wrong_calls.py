@@ -32,6 +32,11 @@ MODELS = {
         "no height to be offset",
     ),
     "coordinate not given": (lambda: bs.PositionSensor(x_m=None, y_m=1.0), "x_m=None"),
+    "a matrix of two minds": (
+        lambda: bs.CartesianPlots(cov=np.triu(np.ones((3, 3))) + np.eye(3)),
+        "symmetric and positive definite",
+    ),
+    "a covariance below zero": (lambda: bs.CartesianPlots(cov=-np.eye(2)), "positive definite"),
     "elevation in the plane": (
         lambda: bs.Radar(range_m=1, elevation_deg=1).components(PLANAR),
         "elevation_rad cannot see a motion in 2 dimensions",
@@ -88,6 +93,7 @@ WRONG_RUNS = {
     "motion": ({"motion": None}, "the motion is a NoneType"),
     "sensor": ({"sensor": LOOSE}, "the sensor is a ConstantVelocity"),
     "name": ({"name": None}, "there is no filter None"),
+    "name in capitals": ({"name": "EKF"}, "did you mean 'ekf'"),
     "noise of other runs": (
         {"sensor": bs.Radar(range_m=[1.0, 2.0], azimuth_deg=1.0, elevation_deg=1.0)},
         "of 4 runs",
@@ -205,3 +211,9 @@ def test_a_conversion_that_cannot_be_is_refused(name):
 def test_a_paper_is_not_repeated_by_halves(wrong, said):
     with pytest.raises(bs.UsageError, match=said):
         bs.reproduce("bordonaro", **wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"seed": 1.5}, {"runs": "many"}, {"first": None}])
+def test_seeds_and_runs_are_whole_numbers(wrong):
+    with pytest.raises(bs.UsageError, match="is not a whole number"):
+        bs.simulate("bordonaro-static", **{"runs": 1, "seed": 1} | wrong)

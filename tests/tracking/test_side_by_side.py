@@ -33,12 +33,12 @@ RECORDINGS = {
 
 
 class Broken:
-    """A filter whose states stop being numbers."""
+    """A filter whose states stop being numbers: the square of its noise is beyond them."""
 
     name = "broken"
 
     def recursion(self, motion, sensor):
-        inner = replace(motion.inner, accel_mps2=float("inf"))
+        inner = replace(motion.inner, accel_mps2=1e200)
         return lookup("ekf").recursion(replace(motion, inner=inner), sensor)
 
 

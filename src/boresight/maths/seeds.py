@@ -62,6 +62,9 @@ def normals(
 
 
 def _check(seed: int, runs: int, first: int) -> None:
+    for name, value in (("seed", seed), ("runs", runs), ("first", first)):
+        if not isinstance(value, int | np.integer):
+            raise UsageError(f"{name}={value!r} is not a whole number")
     if not 0 <= seed < _WORD:
         raise UsageError(f"seed={seed} is outside 0 to 2^64 - 1", next_step="give another seed")
     if runs < 1 or first < 0:

@@ -254,7 +254,7 @@ def lookup(name: str, known: Mapping[str, Found]) -> Found:
     """What is known by that name; UsageError with the nearest valid name if nothing is."""
     if name in known:
         return known[name]
-    near = get_close_matches(str(name), known, n=1)
+    near = get_close_matches(str(name).lower(), known, n=1)
     raise UsageError(
         f"there is no conversion {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
         next_step=f"use one of {', '.join(known)}",

@@ -13,6 +13,7 @@ from boresight.models.components import Component
 from boresight.models.motion import Motion
 
 Array = Any
+_ROUNDING = 1e-9  # of the largest covariance: how far two halves of one may differ
 
 
 def _coordinate(i: int, state: Array) -> Any:
@@ -80,6 +81,16 @@ class CartesianPlots:
             raise UsageError(
                 f"cov of shape {cov.shape} is not the covariance of a position",
                 next_step="give (2, 2) or (3, 3), or one for every plot: (lanes, steps, 3, 3)",
+            )
+        known = cov[np.isfinite(cov).all((-2, -1))]
+        lopsided = np.abs(known - known.mT).max(initial=0.0) > _ROUNDING * np.abs(known).max(
+            initial=0.0
+        )
+        if lopsided or np.any(np.linalg.eigvalsh(known) <= 0):
+            raise UsageError(
+                "cov holds a matrix that is not a covariance",
+                why="it must be symmetric and positive definite",
+                next_step="give NaN where the plot is missing",
             )
         object.__setattr__(self, "cov", cov)
 

@@ -236,8 +236,9 @@ def remarks(
         )
     restarts = int(np.count_nonzero(result.restarts))
     if restarts:
+        often = "Once" if restarts == 1 else f"{restarts} times"
         said.append(
-            f"{restarts} times a track rejected three plots in a row and was started anew; see the "
+            f"{often} a track rejected three plots in a row and was started anew; see the "
             "targets with restarts."
         )
     if nis["all"]["scans"] and nis["all"]["mean"] > 1.25:
