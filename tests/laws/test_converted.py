@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boresight.filters.converted import Converted
 from boresight.filters.recursion import run_recursion
 from boresight.filters.sight import read, sighted
 from boresight.maths import Gaussian, gradient
@@ -42,6 +43,18 @@ def test_the_update_is_linear_in_the_converted_plot(name, world, seed):
     np.testing.assert_allclose(post.mean, expected[0], rtol=1e-9, atol=1e-7)
     np.testing.assert_allclose(post.cov, expected[1], atol=1e-9 * np.max(cov))
     assert post.nis == pytest.approx(expected[2], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "by"), [("ducm", "ucm"), ("cmkf-d-t", "cmkf-d-m"), ("mucm", "mucm"), ("mmse", "mmse")]
+)
+def test_a_first_plot_is_converted_as_if_nothing_else_were_known(name, by):
+    """Erratum B9."""
+    z, sigma = np.array([9e3, 2.0]), np.array([30.0, np.radians(0.8)])
+    start = Converted(conversion=name).start(z[None], PLANE, PLANAR)
+    point = convert(by, z, sigma)
+    np.testing.assert_allclose(start.mean[0, :2], point.mean, rtol=1e-12)
+    np.testing.assert_allclose(start.cov[0, :2, :2], point.cov, rtol=1e-9)
 
 
 @pytest.mark.parametrize("entry", [Entry("ducm"), Entry("ucm"), Entry("range-rate")], ids=str)

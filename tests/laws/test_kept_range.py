@@ -108,6 +108,8 @@ def test_far_away_and_small_it_is_the_extended_filter(sensor, seed):
     np.testing.assert_allclose(ours.mean / sd, ekf.mean / sd, rtol=0, atol=3e-3)
     np.testing.assert_allclose(ours.cov / np.outer(sd, sd), ekf.cov / np.outer(sd, sd), atol=3e-3)
     assert ours.nis == pytest.approx(ekf.nis, abs=0.01)
+    off = (ours.innovation - ekf.innovation)[:3] / np.sqrt(ekf.variance[:3])
+    np.testing.assert_allclose(off, 0.0, atol=1e-9)  # of the range and angles of the prediction
 
 
 @given(seed=seeds)
@@ -142,6 +144,15 @@ def test_noise_of_the_motion_is_that_of_the_place():
     expected = back @ motion.noise(1.0) @ back.T
     sd = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(after / np.outer(sd, sd), expected / np.outer(sd, sd), atol=1e-5)
+
+
+def test_what_an_uncertain_angle_adds_along_the_line_of_sight_is_told():
+    """A range of 5 m, an angle of 0.05 rad, at 10 km: r cos a varies by 18 m."""
+    r, v = 1e4, 0.05**2
+    state = {"mean": np.array([r, 0.0, 0.0, 0.0]), "cov": np.diag([25.0, v, 1.0, 1.0])}
+    told = KEEPS.output(state, PLANE, PLANAR)
+    exact = (r**2 + 25.0) * (1.0 + np.exp(-2.0 * v)) / 2.0 - r**2 * np.exp(-v)
+    assert told.cov[0, 0] == pytest.approx(exact, rel=0.02)
 
 
 def test_right_overhead_an_azimuth_is_anything():
