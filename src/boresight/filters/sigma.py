@@ -207,6 +207,8 @@ def linearise(
     )
     pairs = [innovation(c, v, p) for c, v, p in zip(components, z, predicted, strict=True)]
     seen, nu = (np.array(part) for part in zip(*pairs, strict=True))
+    # A prior that is no Gaussian predicts NaN, which a missing component must not pass on.
+    nu = np.array([select(s < 0.5, 0.0, v) for s, v in zip(seen, nu, strict=True)])
     slopes = upper_solve(L, inverse, D.T).T
     H = np.array([select(s < 0.5, 0.0, h) for s, h in zip(seen, slopes, strict=True)])
     noise = rest + np.diag(np.array([c.sigma * c.sigma for c in components]))
