@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from boresight.filters.converted import Converted
 from boresight.filters.recursion import run_recursion
 from boresight.filters.sight import read, sighted
-from boresight.maths import Gaussian, gradient
+from boresight.maths import Gaussian, gradient, wrap
 from boresight.models.conversions import convert
 from boresight.models.polar import polar_moments
 from boresight.models.sensors import Radar
@@ -43,6 +43,61 @@ def test_the_update_is_linear_in_the_converted_plot(name, world, seed):
     np.testing.assert_allclose(post.mean, expected[0], rtol=1e-9, atol=1e-7)
     np.testing.assert_allclose(post.cov, expected[1], atol=1e-9 * np.max(cov))
     assert post.nis == pytest.approx(expected[2], rel=1e-8)
+    wiggle = np.diag([1e-2, 1e-6, 1e-6][:d])
+    ends = [[convert(name, z + s * step, sigma, place).mean for s in (1, -1)] for step in wiggle]
+    J = np.array([a - b for a, b in ends]) / (2.0 * np.diag(wiggle)[:, None])
+    density = expected[3] + np.log(np.abs(np.linalg.det(J)))
+    assert post.loglik == pytest.approx(density, abs=1e-6 * (1.0 + abs(expected[2])))
+
+
+@pytest.mark.parametrize("entry", OURS, ids=str)
+@given(seed=seeds)
+def test_an_elevation_that_is_missing_is_one_that_is_never_measured(entry, seed):
+    mean, cov = World(SPACE, POLAR).prior(seed)
+    z = World(SPACE, POLAR).plot(mean, seed)
+    z[2] = np.nan
+    post = entry.update(World(SPACE, POLAR), mean, cov, z)
+    flat = entry.update(World(SPACE, FLAT), mean, cov, z[:2])
+    for ours, theirs in zip(post[:5], flat[:5], strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.max(np.abs(theirs)))
+
+
+@pytest.mark.parametrize("lost", [0, 1])
+@pytest.mark.parametrize("entry", OURS, ids=str)
+@given(seed=seeds)
+def test_what_cannot_be_converted_is_used_as_the_extended_filter_does(entry, lost, seed):
+    mean, cov = World(SPACE, POLAR).prior(seed)
+    z = World(SPACE, POLAR).plot(mean, seed)
+    z[lost] = np.nan
+    post, ekf = (each.update(World(SPACE, POLAR), mean, cov, z) for each in (entry, Entry("ekf")))
+    for ours, theirs in zip(post[:5], ekf[:5], strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.max(np.abs(theirs)))
+
+
+def test_the_plot_before_is_remembered_until_there_is_another():
+    """Where the start is before the first, seen from the sensor; a lost plot is not remembered."""
+    method, sensor = Converted(conditioning="previous measurement"), replace(POLAR, pose=POSE)
+    world = World(SPACE, sensor)
+    mean, cov = world.prior(3)
+    begun = method.begin(Gaussian(mean, cov), SPACE, sensor)
+    np.testing.assert_allclose(begun["previous"], mean[:3] - POSE.position_m)
+    z = world.plot(mean, 3)
+    lost, _ = method.update(begun, np.array([np.nan, *z[1:]]), SPACE, sensor)
+    np.testing.assert_array_equal(lost["previous"], begun["previous"])
+    seen, _ = method.update(begun, z, SPACE, sensor)
+    z[1] = wrap(z[1])
+    np.testing.assert_allclose(textbook.polar(POSE.rotation @ seen["previous"]), z, rtol=1e-9)
+
+
+def test_what_is_told_is_shortened_by_the_variances_of_the_angles():
+    """(31): e^-s² of the azimuth; in space of the elevation, too, which alone shortens heights."""
+    mean, cov = np.array([6e3, 0.0, 8e3, 1, 2, 3]), np.diag([900.0, 400.0, 900.0, 9, 9, 9]) ** 2
+    state = {"mean": mean, "cov": cov}
+    told = Converted(scale_output=True).output(state, SPACE, POLAR)
+    azimuth, elevation = 400.0**2 / 6e3**2, 900.0**2 / 1e4**2
+    shorter = np.exp([-azimuth - elevation, 0.0, -elevation, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(told.mean, mean * shorter, rtol=1e-9)
+    np.testing.assert_array_equal(told.cov, cov)
 
 
 @pytest.mark.parametrize(
@@ -198,11 +253,13 @@ def test_what_position_and_velocity_err_together_is_expected_of_the_range_rate(c
     assert found == pytest.approx(1.0, abs=0.03)
 
 
-def test_a_reported_height_is_used_before_the_range_that_needs_it():
+@pytest.mark.parametrize("name", ["ducm", "range-rate"])
+def test_a_reported_height_is_used_before_the_range_that_needs_it(name):
     """Height known to 2 km beforehand and 30 m after: then range is worth its own 50 m."""
-    sensor = Radar(range_m=50.0, azimuth_deg=0.3, height_m=30.0, site=SITE)
+    rate = 1e3 if name == "range-rate" else None
+    sensor = Radar(range_m=50.0, azimuth_deg=0.3, height_m=30.0, range_rate_mps=rate, site=SITE)
     mean, cov = np.array([20e3, 0, 6e3, 0, 0, 0.0]), np.diag([400.0, 400.0, 2e3, 9, 9, 9]) ** 2
     z = np.array([c.value(mean) for c in sensor.components(SPACE)])
-    post = Entry("ducm").update(World(SPACE, sensor), mean, cov, z)
+    post = Entry(name).update(World(SPACE, sensor), mean, cov, z)
     along = mean[:3] / np.linalg.norm(mean[:3])
     assert np.sqrt(along @ post.cov[:3, :3] @ along) < 55.0
