@@ -102,7 +102,7 @@ FAULTS = (
         ("usable=seen[0] * seen[1]", "usable=seen[0]"),
         ("raised = seen[2] if len(seen) == 3 else 1.0", "raised = 1.0"),
         ("(p.sigma * raised for p in parts[2:])", "(p.sigma for p in parts[2:])"),
-        ("[-high * cos, -high * sin, low]", "[high * cos, high * sin, low]"),
+        ("[low * cos, low * sin, high]", "[cos, sin, high]"),
         ("B @ found.cov @ B.T", "found.cov[: len(B), : len(B)]"),
         ("found.mean - sight.position)", "found.mean + sight.position)"),
         ("e2, across = elevation * (1.0", "e2, across = elevation * (0.0"),

@@ -238,6 +238,14 @@ def test_what_an_unknown_elevation_does_to_the_range_is_expected(elevation_deg):
     assert surprise(Entry("ducm"), world, mean, root, 200_000) == pytest.approx(1.0, abs=0.02)
 
 
+def test_at_the_horizon_an_unknown_elevation_costs_the_azimuth_nothing():
+    """Azimuth known to 0.1 rad beforehand and to 0.3 degrees after, elevation to 0.05 rad."""
+    mean, cov = np.array([40e3, 0, 0, 0, 0, 0.0]), np.diag([400.0, 4e3, 2e3, 9, 9, 9]) ** 2
+    z, sharp = np.array([40e3, 0.0]), 40e3 * np.radians(0.3)
+    post = Entry("ducm").update(World(SPACE, Radar(range_m=30.0, azimuth_deg=0.3)), mean, cov, z)
+    assert np.sqrt(post.cov[1, 1]) == pytest.approx(sharp, rel=0.02)
+
+
 @pytest.mark.parametrize("correlation", [-0.9, 0.0, 0.9])
 def test_what_position_and_velocity_err_together_is_expected_of_the_range_rate(correlation):
     """Across, 500 m and 100 m/s, correlated by 0.9: at 15 km 3 m/s of range rate on average.

@@ -98,13 +98,15 @@ def test_points_on_both_sides_of_180_degrees_are_neighbours(name, world, seed):
     close((half @ behind.mean, half @ behind.cov @ half, behind.nis), (*ahead[:2], ahead.nis))
 
 
+@pytest.mark.parametrize("lost", ["range_m", "azimuth_deg", "elevation_deg"])
 @pytest.mark.parametrize("name", ["ukf", "ckf", "iplf"])
 @given(seed=seeds)
-def test_a_missing_component_is_one_that_the_sensor_does_not_have(name, seed):
+def test_a_missing_component_is_one_that_the_sensor_does_not_have(name, lost, seed):
     mean, cov, z, _ = drawn(World(SPACE, POLAR), seed)
-    lacking = World(SPACE, replace(POLAR, elevation_deg=None))
-    without = Entry(name).update(lacking, mean, cov, z[:2])
-    z[2] = np.nan
+    i = ["range_m", "azimuth_deg", "elevation_deg"].index(lost)
+    lacking = World(SPACE, replace(POLAR, **{lost: None}))
+    without = Entry(name).update(lacking, mean, cov, np.delete(z, i))
+    z[i] = np.nan
     close(Entry(name).update(World(SPACE, POLAR), mean, cov, z)[:5], without[:5])
 
 
