@@ -292,8 +292,8 @@ def test_without_range_rate_the_tracker_is_ducm(seed):
 def test_a_speed_that_is_unknown_makes_the_product_less_certain():
     """Known to 300 m/s; 200 m of range at 2 km: 30 m/s of the product over the range, noise 1 m/s.
 
-    20,000 truths of the prior; the standard error of the ratio is 0.02. It is 0.9: a plot is noisy
-    by its own range rate's share, and the filter takes the average; without that share it is 16.
+    20,000 truths of the prior; the standard error of the ratio is 0.02. It is 0.9, and 16 if
+    the speed is taken for known.
     """
     radar = Radar(range_m=200.0, azimuth_deg=0.5, range_rate_mps=1.0)
     mean, root = np.array([2e3, 0.0, -120.0, 0.0]), np.diag([50.0, 50.0, 300.0, 1.0])
