@@ -1,11 +1,10 @@
 """Every filter by name: the only list. `boresight cite NAME` prints where a filter comes from."""
 
 import re
-from difflib import get_close_matches
 from importlib import resources
 from inspect import getdoc, getmodule
 
-from boresight.errors import UsageError
+from boresight.errors import UsageError, unknown
 from boresight.filters import ekf, kalman, mekf, sigma, spherical
 from boresight.filters.converted import Converted
 from boresight.filters.line_of_sight import LineOfSight
@@ -154,11 +153,7 @@ def lookup(name: str) -> Filter:
     """The filter of that name; UsageError with the nearest valid name if there is none."""
     if name in _FILTERS:
         return _FILTERS[name]
-    near = get_close_matches(str(name).lower(), _FILTERS, n=1)
-    raise UsageError(
-        f"there is no filter {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
-        next_step=f"use one of {', '.join(_FILTERS)}",
-    )
+    raise unknown("filter", name, _FILTERS)
 
 
 def cite(name: str) -> dict[str, str]:

@@ -12,6 +12,7 @@ Every error says what, where, why and what to do next, in that order. A lane of 
 cannot raise: it carries a `Status`, and whoever reads the lane turns it into a sentence.
 """
 
+from collections.abc import Iterable
 from enum import IntEnum
 
 
@@ -84,6 +85,18 @@ class OutputError(BoresightError):
     """The result cannot be written."""
 
     exit_code = 74
+
+
+def unknown(kind: str, name: object, known: Iterable[str]) -> UsageError:
+    """The error for a name that nothing of its kind has, with the nearest one that exists."""
+    from difflib import get_close_matches
+
+    names = [*known]
+    near = get_close_matches(str(name).lower(), names, n=1)
+    return UsageError(
+        f"there is no {kind} {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
+        next_step=f"use one of {', '.join(names)}",
+    )
 
 
 class Status(IntEnum):

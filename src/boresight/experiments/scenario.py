@@ -8,14 +8,13 @@ else. All are in SI units (`bordonaro`'s feet become metres) but for `aditya`, w
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache, partial
 from importlib import resources
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from boresight.errors import UsageError
+from boresight.errors import UsageError, unknown
 from boresight.filters.start import SPEED_MPS
 from boresight.maths import Gaussian
 from boresight.models.motion import ConstantVelocity, Motion, SphericalUnitRate, Static
@@ -207,8 +206,4 @@ def lookup(name: str) -> Scenario:
     known = _scenarios()
     if name in known:
         return known[name]
-    near = get_close_matches(name, known, n=1)
-    raise UsageError(
-        f"there is no scenario {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
-        next_step=f"use one of {', '.join(known)}",
-    )
+    raise unknown("scenario", name, known)

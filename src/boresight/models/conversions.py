@@ -26,12 +26,11 @@ for the truth.
 """
 
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from boresight.errors import UsageError
+from boresight.errors import UsageError, unknown
 from boresight.maths import Gaussian
 from boresight.models.polar import (
     EXACT,
@@ -254,11 +253,7 @@ def lookup(name: str, known: Mapping[str, Found]) -> Found:
     """What is known by that name; UsageError with the nearest valid name if nothing is."""
     if name in known:
         return known[name]
-    near = get_close_matches(str(name).lower(), known, n=1)
-    raise UsageError(
-        f"there is no conversion {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
-        next_step=f"use one of {', '.join(known)}",
-    )
+    raise unknown("conversion", name, known)
 
 
 def understand(z: Array, sigma: Array) -> Plot:

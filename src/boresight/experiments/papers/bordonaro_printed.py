@@ -4,19 +4,16 @@ Paper: bordonaro (22), (26) to (30), (37), (38).
 Differs from it: not at all, so errata B2 to B7 are all in here; nothing else uses it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from boresight.filters import kalman
-from boresight.filters.sight import relative_place
-from boresight.filters.start import SPEED_MPS, one_plot
-from boresight.filters.steps import State, Surprise, gaussian_layout
-from boresight.lanes import Leaf
+from boresight.filters.posterior import Posterior
+from boresight.filters.steps import Updating
 from boresight.maths import Gaussian, missing, select
-from boresight.models.motion import Motion
-from boresight.models.sensors import Sensor
+from boresight.models.components import Component
 
 Array = Any
 
@@ -52,51 +49,22 @@ def decorrelated(z: Array, sigma: Array, position: Array, cov: Array) -> Gaussia
     return Gaussian(point, np.array([[r11, r12], [r12, r22]]))
 
 
-@dataclass(frozen=True, kw_only=True)
-class PrintedDucm:
-    """The Kalman filter with (24) to (30) as printed, in the plane; it starts by erratum B9."""
+def printed_update(prior: Gaussian, z: Array, components: Sequence[Component]) -> Posterior:
+    """The linear Kalman filter with (24) to (30) as printed, for a sensor at the origin.
 
-    @property
-    def plain(self) -> bool:
-        """It tells what it keeps."""
-        return True
+    Args:
+        prior: predicted mean (n,), cov (n, n); positions x, y first.
+        z: (2,) range and bearing, NaN where missing.
+        components: range and bearing.
+    """
+    H = np.eye(2, len(prior.mean))
+    gone = missing(z[0]) | missing(z[1])
+    safe = np.array([select(gone, 1.0, value) for value in z])
+    sigma = [part.sigma for part in components]
+    found = decorrelated(safe, sigma, prior.mean[:2], H @ prior.cov @ H.T)
+    point = np.array([select(gone, np.nan, value) for value in found.mean])
+    return kalman.update(prior, point, H, found.cov)
 
-    def start(
-        self, z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float = SPEED_MPS
-    ) -> Gaussian:
-        """That of DUCM."""
-        return one_plot(z, motion, sensor, speed_mps=speed_mps, conversion="ducm")
 
-    def layout(self, motion: Motion, sensor: Sensor) -> dict[str, Leaf]:
-        """Mean and covariance."""
-        del sensor
-        return gaussian_layout(motion)
-
-    def begin(self, start: Gaussian, motion: Motion, sensor: Sensor) -> State:
-        """The Gaussian itself."""
-        del motion, sensor
-        return start._asdict()
-
-    def predict(self, state: State, motion: Motion, sensor: Sensor, dt: Any) -> State:
-        """By the motion."""
-        del sensor
-        return kalman.predict(Gaussian(state["mean"], state["cov"]), motion, dt)._asdict()
-
-    def update(
-        self, state: State, z: Array, motion: Motion, sensor: Sensor
-    ) -> tuple[State, Surprise]:
-        """By the linear Kalman filter."""
-        prior = Gaussian(state["mean"], state["cov"])
-        position, H = relative_place(prior.mean, motion, sensor)
-        gone = missing(z[0]) | missing(z[1])
-        safe = np.array([select(gone, 1.0, value) for value in z])
-        sigma = [part.sigma for part in sensor.components(motion)]
-        found = decorrelated(safe, sigma, position, H @ prior.cov @ H.T)
-        point = np.array([select(gone, np.nan, value) for value in found.mean])
-        post = kalman.update(prior, point, H, found.cov)
-        return {"mean": post.mean, "cov": post.cov}, Surprise(*post[2:])
-
-    def output(self, state: State, motion: Motion, sensor: Sensor) -> Gaussian:
-        """The Gaussian itself."""
-        del motion, sensor
-        return Gaussian(state["mean"], state["cov"])
+# It starts as DUCM does, by erratum B9.
+PRINTED_DUCM = Updating(formula=printed_update, conversion="ducm")

@@ -13,7 +13,7 @@ import numpy as np
 
 from boresight.experiments.consistency import line_of_sight_axes
 from boresight.experiments.metrics import errors, nees
-from boresight.experiments.papers.bordonaro_printed import PrintedDucm
+from boresight.experiments.papers.bordonaro_printed import PRINTED_DUCM
 from boresight.experiments.scenario import FOOT_M, Scenario
 from boresight.experiments.simulate import Plots, Truth, simulate
 from boresight.filters.converted import Converted
@@ -27,7 +27,7 @@ OTHERS = ("UCM", "MUCM")
 COMPARED = (*OTHERS, "DUCM")
 PRINTED = "DUCM as printed"
 METHODS: dict[str, Method] = {name: Converted(conversion=name.lower()) for name in COMPARED}
-METHODS[PRINTED] = PrintedDucm()
+METHODS[PRINTED] = PRINTED_DUCM
 
 
 class Tracked(NamedTuple):
