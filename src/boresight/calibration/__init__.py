@@ -1,0 +1,1 @@
+"""What is wrong with a sensor, found against a reference and said with its uncertainty."""
