@@ -76,7 +76,7 @@ class NoiseFound:
 
     range_m: float
     azimuth_deg: float
-    elevation_deg: float | None
+    elevation_deg: float | None = None
     target_range_m: float
     outlier_share: float
     laws: dict[str, Law] = field(default_factory=dict)
