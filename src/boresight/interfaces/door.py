@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boresight.errors import OutputError, UsageError
+from boresight.errors import OutputError, UsageError, unknown
 
 if TYPE_CHECKING:
     from boresight.filters.method import Filter
@@ -32,13 +32,45 @@ def site(text: str) -> "Site":
     return Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
 
 
-def atmosphere(name: str) -> "Atmosphere | None":
-    """The air of that name, None for none."""
-    from boresight.models.atmosphere import EffectiveEarth, ExponentialAtmosphere
+def atmosphere(text: str) -> "Atmosphere | None":
+    """The air of that name, None for none.
 
-    if name == "effective-earth":
-        return EffectiveEarth()
-    return ExponentialAtmosphere() if name == "exponential" else None
+    Raises:
+        UsageError: no such air.
+    """
+    from boresight.models.atmosphere import atmosphere as named
+
+    return named(text)
+
+
+# What a user may write for terms of systematic error, beside their full names.
+SHORT_TERMS = {
+    "range": ("range_bias_m",),
+    "gain": ("range_gain_m_per_km",),
+    "azimuth": ("azimuth_bias_deg",),
+    "eccentricity": ("azimuth_cos_deg", "azimuth_sin_deg"),
+    "time": ("time_bias_s",),
+    "elevation": ("elevation_bias_deg",),
+    "site": ("site_east_m", "site_north_m"),
+}
+
+
+def terms(text: str) -> tuple[str, ...]:
+    """Read terms of systematic error, parted by commas: `range,azimuth,time`.
+
+    Raises:
+        UsageError: no such term, or one named twice.
+    """
+    from boresight.models.systematic import TERMS
+
+    found: list[str] = []
+    for name in (part.strip() for part in text.split(",")):
+        if name not in SHORT_TERMS and name not in TERMS:
+            raise unknown("term of systematic error", name, [*SHORT_TERMS, *TERMS])
+        found += SHORT_TERMS.get(name, (name,))
+    if len(set(found)) < len(found):
+        raise UsageError(f"--terms {text!r} names a term twice", next_step="name each once")
+    return tuple(found)
 
 
 def sensor(text: str, known: Sequence[str]) -> str:

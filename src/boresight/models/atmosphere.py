@@ -11,13 +11,14 @@ global mean, is the reference atmosphere of ITU-R P.453; curvature and effective
 ITU-R P.834. Against a traced ray the delay is within 5 mm and the bending within 0.03 % to 460 km.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import legendre
 
+from boresight.errors import UsageError, unknown
 from boresight.maths.gaussian import Array
 
 EARTH_M = 6_371_000.0
@@ -136,3 +137,51 @@ def _sine_elevation(range_m: Array, height_m: Array, site_height_m: Array, earth
     start = earth_m + site_height_m
     sine = (rise + (rise**2 - np.square(range_m)) / (2 * start)) / range_m
     return np.clip(sine, -1, 1)
+
+
+ATMOSPHERES: dict[str, type[EffectiveEarth] | type[ExponentialAtmosphere] | None] = {
+    "none": None,
+    "effective-earth": EffectiveEarth,
+    "exponential": ExponentialAtmosphere,
+}
+
+
+def spelled(air: Atmosphere | None) -> str:
+    """The name of an atmosphere with the numbers that are not the usual ones.
+
+    Raises:
+        UsageError: it is not one of ours.
+    """
+    if air is None or isinstance(air, NoAtmosphere):
+        return "none"
+    for name, kind in ATMOSPHERES.items():
+        if kind is not None and isinstance(air, kind):
+            usual = asdict(kind())
+            own = [f"{n}={v!r}" for n, v in asdict(air).items() if v != usual[n]]
+            return f"{name}:{','.join(own)}" if own else name
+    raise UsageError(
+        f"{air!r} cannot be named in a file",
+        next_step="use NoAtmosphere, EffectiveEarth or ExponentialAtmosphere",
+    )
+
+
+def atmosphere(text: str) -> Atmosphere | None:
+    """The atmosphere that `spelled` names; None for none.
+
+    Raises:
+        UsageError: no such atmosphere, or a number that it does not have.
+    """
+    name, _, numbers = text.partition(":")
+    if name not in ATMOSPHERES:
+        raise unknown("atmosphere", name, ATMOSPHERES)
+    kind = ATMOSPHERES[name]
+    try:
+        pairs = [part.split("=") for part in numbers.split(",")] if numbers else []
+        own = {key: float(value) for key, value in pairs}
+        return None if kind is None else kind(**own)
+    except (TypeError, ValueError) as error:
+        raise UsageError(
+            f"{text!r} is not an atmosphere",
+            why=str(error),
+            next_step="for example: exponential:surface_refractivity=330",
+        ) from None
