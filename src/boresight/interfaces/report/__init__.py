@@ -1,4 +1,4 @@
-"""The report: one self-contained HTML page about one tracked recording."""
+"""The report: one self-contained HTML page about one recording, tracked, calibrated, or both."""
 
 from boresight.interfaces.report.page import Report, report
 

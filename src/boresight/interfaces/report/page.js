@@ -136,13 +136,23 @@
     }
   };
 
+  // A tracking page shows one target at a time; a calibration's has none to choose.
+  const explore = (charts, series) => {
+    const show = prepare(charts, series);
+    listen(show);
+    const asked = /^#track=(\d+)$/.exec(location.hash);
+    const first = series.index.find((each) => each.count >= 60) ?? series.index[0];
+    if (first) show(asked ? Number(asked[1]) : first.track);
+    if (asked) byId("plan").scrollIntoView();
+  };
+
   const start = async () => {
     byId("no-script").remove();
     const script = document.createElement("script");
     script.textContent = await inflate("library");
     document.head.append(script);
     const { charts, series } = JSON.parse(await inflate("drawing"));
-    if (!hasWebGl()) {
+    if (series && !hasWebGl()) {
       for (const trace of charts["plan-chart"].data) trace.type = "scatter";
     }
     for (const [name, chart] of Object.entries(charts)) {
@@ -150,12 +160,7 @@
         { ...calm, scrollZoom: name === "plan-chart" });
       await paint();
     }
-    const show = prepare(charts, series);
-    listen(show);
-    const asked = /^#track=(\d+)$/.exec(location.hash);
-    const first = series.index.find((each) => each.count >= 60) ?? series.index[0];
-    if (first) show(asked ? Number(asked[1]) : first.track);
-    if (asked) byId("plan").scrollIntoView();
+    if (series) explore(charts, series);
     document.documentElement.dataset.drawn = "true";
   };
 
@@ -164,7 +169,7 @@
     words.className = "broken";
     words.textContent = `The charts could not be drawn in this browser (${error.message}). ` +
       "The sentences and tables of this page are complete without them.";
-    byId("plan").prepend(words);
+    document.querySelector("main").prepend(words);
     document.documentElement.dataset.drawn = "false";
   });
 })();

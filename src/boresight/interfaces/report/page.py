@@ -10,19 +10,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boresight.errors import OutputError
+from boresight.errors import OutputError, UsageError
 from boresight.interfaces.answers import plain
-from boresight.interfaces.report import (
-    beside,
-    charts,
-    consistency,
-    plan,
-    residuals,
-    sections,
-    target,
-)
+from boresight.interfaces.report import calibrated, charts, sections, tracks
+from boresight.interfaces.report.sections import Part
 
 if TYPE_CHECKING:
+    from boresight.calibration.result import Calibration
     from boresight.tracking.result import Comparison, TrackingResult
 
 # The library compiles its drawing commands, hence unsafe-eval; nothing may be fetched at all.
@@ -67,14 +61,15 @@ class Report:
 
 
 def report(
-    result: "TrackingResult",
+    result: "TrackingResult | None" = None,
     comparisons: "Sequence[Comparison]" = (),
     inspection: dict[str, Any] | None = None,
     command: str = "",
     *,
     as_seen: "Sequence[Comparison]" = (),
+    calibration: "Calibration | None" = None,
 ) -> Report:
-    """Make the report of a tracked recording.
+    """Make the report of a tracked recording, of a radar's calibration, or of both.
 
     Args:
         result: what the tracker found.
@@ -83,26 +78,22 @@ def report(
         command: the command line that made it, for the reader who wants to repeat it.
         as_seen: the same filters against the truth as the sensor, with its known systematic
             errors, would see it without noise.
+        calibration: of the radar.
+
+    Raises:
+        UsageError: there is nothing to report.
     """
     inspection = inspection or {}
-    drawn = [
-        *residuals.panels(result.residuals),
-        *consistency.panels(result.residuals, result.targets),
-        *beside.panels(result),
-    ]
-    view, series = plan.plan(result), target.series(result)
-    parts = sections.Parts(
-        result=result,
-        comparisons=comparisons,
-        as_seen=as_seen,
-        inspection=inspection,
-        provenance=_provenance(inspection, command),
-        plan_caption=view.caption,
-        panels=drawn,
-        series=series,
-    )
-    shown = {"plan-chart": view.chart} | {panel.name: panel.chart for panel in drawn}
-    return Report(_page(parts, {"charts": shown, "series": series.content}))
+    parts = []
+    if result is not None:
+        parts.append(tracks.part(result, comparisons, as_seen, inspection))
+    if calibration is not None:
+        parts.append(calibrated.part(calibration, {} if parts else inspection))
+    if not parts:
+        raise UsageError(
+            "a report needs tracks, a calibration, or both", next_step="report(tracks, calibration)"
+        )
+    return Report(_page(parts, inspection, _provenance(inspection, command)))
 
 
 def _provenance(inspection: dict[str, Any], command: str) -> dict[str, Any]:
@@ -121,17 +112,22 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _page(parts: sections.Parts, drawing: dict[str, Any]) -> str:
+def _page(parts: Sequence[Part], inspection: dict[str, Any], provenance: dict[str, Any]) -> str:
     here = files("boresight.interfaces.report")
     style, script = ((here / name).read_text("utf-8") for name in ("page.css", "page.js"))
-    title = escape(str(parts.inspection.get("file", "tracking report")))
+    title = escape(str(inspection.get("file", f"{parts[0].kind} report")))
+    shown = {name: chart for part in parts for name, chart in part.charts.items()}
+    drawing = {"charts": shown, "series": parts[0].series}
+    facts = {name: fact for part in parts for name, fact in part.facts.items()}
+    facts |= {"recording": inspection, "provenance": provenance}
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{title} · boresight</title>\n<link rel="icon" href="data:,">\n'
-        f"<style>\n{style}</style>\n</head>\n<body>\n{sections.body(parts)}\n"
-        f'<script type="application/json" id="boresight-report">{_facts(parts)}</script>\n'
+        f"<style>\n{style}</style>\n</head>\n"
+        f"<body>\n{sections.body(parts, inspection, provenance)}\n"
+        f'<script type="application/json" id="boresight-report">{_json(facts)}</script>\n'
         f'<script type="application/octet-stream" id="library">{charts.packed(charts.library())}'
         "</script>\n"
         f'<script type="application/octet-stream" id="drawing">{charts.packed_json(drawing)}'
@@ -139,25 +135,6 @@ def _page(parts: sections.Parts, drawing: dict[str, Any]) -> str:
     )
 
 
-def _facts(parts: sections.Parts) -> str:
+def _json(facts: dict[str, Any]) -> str:
     """The machine-readable part: what the page says, as JSON; `<` cannot end the element."""
-    from dataclasses import asdict
-
-    result = parts.result
-    facts = {
-        "plots": result.plots,
-        "used": result.used,
-        "rejected": result.rejected,
-        "filter": result.filter,
-        "nis": result.nis,
-        "filters": [asdict(each) for each in result.filters],
-        "settings": result.settings,
-        "remarks": result.remarks,
-        "targets": result.targets.to_dicts(),
-        "skipped": result.skipped.to_dicts(),
-        "comparisons": [asdict(each) for each in parts.comparisons],
-        "as_seen": [asdict(each) for each in parts.as_seen],
-        "recording": parts.inspection,
-        "provenance": parts.provenance,
-    }
     return json.dumps(plain(facts), allow_nan=False).replace("<", "\\u003c")
