@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boresight.formats import usable
+
 if TYPE_CHECKING:
     import polars as pl
 
@@ -21,12 +23,7 @@ GAP_SCANS = 8
 FEWEST = 3  # plots that make a second aircraft of the same identity
 DUPLICATE_SCANS = 0.125  # two plots of one identity closer than this are one reply seen twice
 
-MEANINGS = {
-    "coasted": "the radar's own prediction, not a measurement (report type none)",
-    "no position": "range or azimuth is missing",
-    "test": "a test target or a simulated one",
-    "no identity": "neither a 24-bit address nor a Mode A code",
-    "garbled code": "the Mode A code is marked garbled or not validated, and there is no address",
+MEANINGS = usable.MEANINGS | {
     "jump": "too far from the other plots of its identity for anything that flies",
     "duplicate": "a second plot of the same identity in the same instant (split or reflected)",
 }
@@ -52,7 +49,7 @@ class Sorted:
 def sort_by_identity(plots: "pl.DataFrame") -> Sorted:
     """Sort the plots of one sensor into tracks, and say why the others are not used."""
     time = plots["time_s"].to_numpy()
-    skipped = _unusable(plots)
+    skipped = usable.unusable(plots)
     keys = _keys(plots, skipped)
     rows = np.flatnonzero(skipped == "")
     rows = rows[np.lexsort((time[rows], keys[rows]))]
@@ -68,34 +65,9 @@ def sort_by_identity(plots: "pl.DataFrame") -> Sorted:
     return Sorted(rows[order], track[order], skipped, scan)
 
 
-def _column(plots: "pl.DataFrame", name: str, default: Any) -> Array:
-    if name not in plots.columns:
-        return np.full(plots.height, default)
-    return plots[name].fill_null(default).to_numpy()
-
-
-def _unusable(plots: "pl.DataFrame") -> Array:
-    """Reason per plot, empty if none; the first that holds."""
-    address = _column(plots, "address", "")
-    code = _column(plots, "mode_a", "")
-    finite = np.isfinite(_column(plots, "range_m", np.nan).astype(float)) & np.isfinite(
-        _column(plots, "azimuth_deg", np.nan).astype(float)
-    )
-    tests = _column(plots, "test", False) | _column(plots, "simulated", False)
-    garbled = (address == "") & ~_column(plots, "mode_a_valid", True).astype(bool)
-    reasons = [
-        ("coasted", _column(plots, "report_type", "") == "none"),
-        ("no position", ~finite),
-        ("test", tests.astype(bool)),
-        ("no identity", (address == "") & (code == "")),
-        ("garbled code", garbled),
-    ]
-    return np.select([holds for _, holds in reasons], [name for name, _ in reasons], default="")
-
-
 def _keys(plots: "pl.DataFrame", skipped: Array) -> Array:
     """A number per identity: addresses and codes do not share numbers."""
-    address, code = _column(plots, "address", ""), _column(plots, "mode_a", "")
+    address, code = usable.column(plots, "address", ""), usable.column(plots, "mode_a", "")
     names = np.where(address != "", np.char.add("#", address.astype(str)), code.astype(str))
     keys = np.unique(names, return_inverse=True)[1]
     return np.where(skipped == "", keys, -1)
@@ -110,8 +82,8 @@ def _scan(time: Array, keys: Array) -> float:
 
 def _positions(plots: "pl.DataFrame") -> Array:
     """Slant range and azimuth as a point in the plane, complex, m: enough to tell near from far."""
-    azimuth = np.radians(_column(plots, "azimuth_deg", np.nan).astype(float))
-    return _column(plots, "range_m", np.nan).astype(float) * np.exp(1j * azimuth)
+    azimuth = np.radians(usable.column(plots, "azimuth_deg", np.nan).astype(float))
+    return usable.column(plots, "range_m", np.nan).astype(float) * np.exp(1j * azimuth)
 
 
 def _without_duplicates(
