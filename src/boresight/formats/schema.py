@@ -49,19 +49,28 @@ QUANTITIES: dict[str, Quantity] = {
 OUR_NAMES = {stem: f"{stem}_{next(iter(q.units))}" for stem, q in QUANTITIES.items()}
 
 TEXTS = ("sensor", "address", "mode_a", "aircraft_id", "report_type", "target")
-FLAGS = ("altitude_valid", "mode_a_valid", "simulated", "test", "fixed_transponder", "conical")
+FLAGS = (
+    "altitude_valid",
+    "mode_a_valid",
+    "simulated",
+    "test",
+    "fixed_transponder",
+    "conical",
+    "on_ground",
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a table of one kind must have."""
+    """What a table of one kind must have, and whether its times must not decrease."""
 
     name: str
     required: tuple[str, ...]
+    in_order: bool = True
 
 
 PLOTS = Kind("plots", ("time_s", "range_m", "azimuth_deg"))
-REFERENCE = Kind("reference", ("time_s", "latitude_deg", "longitude_deg"))
+REFERENCE = Kind("reference", ("time_s", "latitude_deg", "longitude_deg"), in_order=False)
 BEARINGS = Kind("bearings", ("time_s", "bearing_deg"))
 OWN_SHIP = Kind("own ship", ("time_s",))
 

@@ -71,7 +71,8 @@ def read_table(
     table, lines, skipped = _drop_incomplete(path, table, kind, first_line, strict=strict)
     for source in found:
         _check_bounds(path, table, source.ours, lines)
-    _check_order(path, table, lines)
+    if kind.in_order:
+        _check_order(path, table, lines)
     return table, skipped
 
 
