@@ -1,0 +1,211 @@
+"""Whether a radar errs alike in all directions and all the time: sectors, spells, drift, steps.
+
+Each number is an estimate with an interval clustered by target (`mixed`). Many are looked at, so
+what is called more than chance must be so after the number of looks is allowed for (Bonferroni):
+a radar that is stable gets a remark in less than one recording in twenty.
+"""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boresight.calibration import mixed, steps
+from boresight.calibration.bins import Bins, joined
+from boresight.calibration.pairs import Pairs
+from boresight.calibration.residuals import Registered, at_door, medians, place, spread
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Array = Any
+_SECTOR_DEG = 10.0
+_SPELLS, _PAIRS_A_SPELL = 24, 200
+_ROWS, _TARGETS = 30, 3  # of an interval, at least: fewer targets have no interval to speak of
+_GROSS = 5.0  # robust standard deviations about an interval's median: no measurement of its target
+_CHANCE = 0.01  # of a false remark, for each of sectors, spells, drift
+_HOUR_S = 3_600.0
+UNITS = {"m": " m", "deg": "°"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stability:
+    """How a radar's errors differ from their fit by direction and by time.
+
+    Attributes:
+        tables: `sectors` (azimuth_from_deg, azimuth_to_deg, pairs, targets, range_m, range_sd_m,
+            azimuth_deg, azimuth_sd_deg and half-widths range_ci95_m, azimuth_ci95_deg), measured
+            minus true against the mean over all; `over_time` (time_from_s, time_to_s and the same);
+            `drift` (channel, per_hour, sd, low, high); `steps` (channel, time_s, size, sd, low,
+            high). The sd are those of the estimate, clustered by target.
+        remarks: what is more than chance, in sentences.
+    """
+
+    tables: "dict[str, pl.DataFrame]" = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+
+def stability(pairs: Pairs, registration: Registered) -> Stability:
+    """What is left after a registration, by sector and over time.
+
+    Args:
+        pairs: m pairs.
+        registration: of these pairs; only what is left of them counts here, not what it took for an
+            outlier: a whole sector that errs would be one.
+    """
+    if not len(pairs):
+        return Stability()
+    left = at_door(pairs, registration.after)
+    sectors, remarks = _sectors(pairs, left)
+    over_time, spells = _over_time(pairs, left)
+    changes, told = _changes(pairs, left)
+    tables = {"sectors": sectors, "over_time": over_time, **changes}
+    return Stability(tables=tables, remarks=remarks + (told or spells))
+
+
+def _sectors(pairs: Pairs, left: dict[str, Array]) -> "tuple[pl.DataFrame, list[str]]":
+    edges = np.arange(0.0, 360.0 + _SECTOR_DEG, _SECTOR_DEG)
+    bins = joined(place(pairs)[1], edges, pairs.target, rows=_ROWS, targets=_TARGETS)
+    return _by_interval("azimuth", "deg", bins, pairs, left)
+
+
+def _over_time(pairs: Pairs, left: dict[str, Array]) -> "tuple[pl.DataFrame, list[str]]":
+    bins = joined(pairs.time_s, _spells(pairs), pairs.target, rows=_ROWS, targets=_TARGETS)
+    return _by_interval("time", "s", bins, pairs, left)
+
+
+def _spells(pairs: Pairs) -> Array:
+    """Edges of equal spells of the recording, as many as its pairs bear."""
+    count = int(np.clip(len(pairs) // _PAIRS_A_SPELL, 1, _SPELLS))
+    first, last = float(pairs.time_s.min()), float(pairs.time_s.max())
+    edges = np.linspace(first, last, count + 1)
+    edges[-1] = np.nextafter(last, np.inf)
+    return edges
+
+
+def _by_interval(
+    name: str, unit: str, bins: Bins, pairs: Pairs, left: dict[str, Array]
+) -> "tuple[pl.DataFrame, list[str]]":
+    """Table of the mean error in each interval, and what of it is beyond chance."""
+    import polars as pl
+
+    inside = bins.index >= 0
+    seen = np.zeros((len(bins), len(pairs.names)), dtype=bool)
+    seen[bins.index[inside], pairs.target[inside]] = True
+    columns = {
+        f"{name}_from_{unit}": bins.low,
+        f"{name}_to_{unit}": bins.high,
+        "pairs": np.bincount(bins.index[inside], minlength=len(bins)),
+        "targets": seen.sum(axis=1),
+    }
+    said = []
+    for channel, y in left.items():
+        what, channel_unit = channel.rsplit("_", 1)
+        found = _means(y, bins, pairs.target)
+        columns[channel] = found.value
+        columns[f"{what}_sd_{channel_unit}"] = found.sd
+        columns[f"{what}_ci95_{channel_unit}"] = found.half_width()
+        said += _worst(name, bins, channel, found, looks=len(bins) * len(left))
+    return pl.DataFrame(columns), said
+
+
+def _means(y: Array, bins: Bins, target: Array) -> mixed.Estimates:
+    """Mean of each interval against the mean over all."""
+    cell, who, count, mean = _cells(y, bins, target)
+    X = np.eye(len(bins))[cell]
+    share = np.bincount(cell, weights=count, minlength=len(bins)) / count.sum()
+    return mixed.estimate(X, mean, count, who, np.eye(len(bins)) - share)
+
+
+def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ...]:
+    """Means over the plots of one target in one interval, without gross ones.
+
+    Returns:
+        (r,) interval, target, number of plots and mean of y, then means of `more`.
+    """
+    scale = spread(y, bins)
+    off = np.abs(y - medians(y, bins)[bins.index])
+    good = (bins.index >= 0) & (off <= _GROSS * np.maximum(scale, 1e-12)[bins.index])
+    width = int(target.max()) + 1
+    key = bins.index[good] * width + target[good]
+    cells, where = np.unique(key, return_inverse=True)
+    count = np.bincount(where)
+    means = [np.bincount(where, weights=x[good]) / count for x in (y, *more)]
+    return cells // width, cells % width, count.astype(float), *means
+
+
+def _worst(name: str, bins: Bins, channel: str, found: mixed.Estimates, looks: int) -> list[str]:
+    """One sentence on the intervals that differ by more than chance, and on the worst of them."""
+    beyond = np.flatnonzero(found.p() * looks < _CHANCE)
+    if len(bins) < 2 or not len(beyond):
+        return []
+    worst = beyond[np.argmax(np.abs(found.value[beyond]))]
+    what, unit = channel.rsplit("_", 1)
+    size = f"{_number(found.value[worst], unit)} ± {_number(found.half_width()[worst], unit, '')}"
+    if name == "azimuth":
+        where = f"sector from {bins.low[worst]:.0f}° to {bins.high[worst]:.0f}°"
+        kind = "sectors"
+    else:
+        where = f"spell from {bins.low[worst]:.0f} s to {bins.high[worst]:.0f} s"
+        kind = "spells of time"
+    told = f"In {len(beyond)} of {len(bins)} {kind} the {what} errs otherwise than on average"
+    return [f"{told}, beyond chance: by {size} in the {where}."]
+
+
+def _changes(pairs: Pairs, left: dict[str, Array]) -> "tuple[dict[str, pl.DataFrame], list[str]]":
+    """Drift and steps, estimated together so that neither is taken for the other."""
+    import polars as pl
+
+    drifts, jumps, said = [], [], []
+    for channel, y in left.items():
+        at = steps.find(pairs.time_s, pairs.target, y)
+        found = _trend(pairs, y, at)
+        if found is None:
+            continue
+        half = found.half_width()
+        rows = [
+            (channel, float(v), float(s), float(v - h), float(v + h))
+            for v, s, h in zip(found.value, found.sd, half, strict=True)
+        ]
+        drifts.append(rows[0])
+        jumps += [(row[0], float(t), *row[1:]) for t, row in zip(at, rows[1:], strict=True)]
+        said += _told(channel, at, found, looks=len(left))
+    numbers = ["sd", "low", "high"]
+    drift = pl.DataFrame(drifts, schema=["channel", "per_hour", *numbers], orient="row")
+    step = pl.DataFrame(
+        jumps,
+        schema={"channel": pl.String} | dict.fromkeys(["time_s", "size", *numbers], pl.Float64),
+        orient="row",
+    )
+    return {"drift": drift, "steps": step}, said
+
+
+def _trend(pairs: Pairs, y: Array, at: Array) -> mixed.Estimates | None:
+    """Slope per hour and the size of each step; None where there is no time to have one."""
+    edges = np.unique(np.concatenate([_spells(pairs), at]))
+    bins = joined(pairs.time_s, edges, pairs.target, rows=1, targets=1)
+    cell, who, count, mean, hours = _cells(y, bins, pairs.target, pairs.time_s / _HOUR_S)
+    if np.ptp(hours) <= 0.0 or len(np.unique(who)) < _TARGETS:
+        return None
+    later = [(bins.low[cell] >= t).astype(float) for t in at]
+    X = np.column_stack([np.ones(len(hours)), hours - hours.mean(), *later])
+    return mixed.estimate(X, mean, count, who, np.eye(X.shape[1])[1:])
+
+
+def _told(channel: str, at: Array, found: mixed.Estimates, looks: int) -> list[str]:
+    what, unit = channel.rsplit("_", 1)
+    sizes = [
+        f"{_number(v, unit)} ± {_number(h, unit, '')}"
+        for v, h in zip(found.value, found.half_width(), strict=True)
+    ]
+    said = [
+        f"At {t:.1f} s the {what} of all targets steps by {size}."
+        for t, size in zip(at, sizes[1:], strict=True)
+    ]
+    if found.p()[0] * looks < _CHANCE:
+        said.append(f"The {what} drifts by {sizes[0]} an hour, beyond chance.")
+    return said
+
+
+def _number(value: float, unit: str, sign: str = "+") -> str:
+    return f"{value:{sign}.3g}{UNITS[unit]}"

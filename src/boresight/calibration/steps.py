@@ -1,0 +1,98 @@
+"""Steps: the turn of the antenna at which a radar began to err otherwise.
+
+At every plot the mean of the next plots of its target is compared with the mean of those before it.
+The target's own error, and whatever the reference does slowly, cancels. Plots of one turn of the
+antenna are added up, each at most so large that no one or two targets can raise an alarm: a
+step of the radar shows in all its targets, a jump in one is that target's or its reference's.
+The scales are those that the recording itself has, so noise that is not white widens them.
+This is a generalised likelihood ratio over a moving window, for a step of unknown size.
+
+[lai1995] T. L. Lai, "Sequential changepoint detection in quality control and dynamical systems":
+window-limited likelihood ratios. Differs from it: bounded contributions, empirical scales.
+"""
+
+from typing import Any
+
+import numpy as np
+
+Array = Any
+AFTER, BEFORE, LEAST_BEFORE = 5, 20, 5  # plots of a target: a step is known five turns later
+_CLIP = 4.0  # standard deviations of a plot: larger is as large, for an outlier as for a step
+_MOST = 2.7  # of one target, in standard deviations: two together stay below the threshold
+_THRESHOLD = 4.5  # standard deviations of a turn's sum: normally passed once in 150,000 turns
+_MAD_TO_SD = 1.4826
+_APART = AFTER + BEFORE  # turns: nearer alarms are one
+_LEAST_TURNS = 30
+
+
+def turn_s(time_s: Array, target: Array) -> float:
+    """Time between two plots of one target, as the most of them have it; NaN if there is none."""
+    order = np.lexsort((time_s, target))
+    gap = np.diff(time_s[order])[np.diff(target[order]) == 0]
+    gap = gap[gap > 0.0]
+    return float(np.median(gap)) if len(gap) else float("nan")
+
+
+def find(time_s: Array, target: Array, y: Array) -> Array:
+    """Times at which the errors of all targets step together.
+
+    Args:
+        time_s: (m,) of the plots.
+        target: (m,) number of the target, from 0.
+        y: (m,) residuals; NaN is left out.
+
+    Returns:
+        (steps,) ascending: each the beginning of the turn that has the first plots after a step. A
+        recording without a step has one in less than 1e-5 of its turns.
+    """
+    here = np.isfinite(y)
+    period = turn_s(time_s[here], target[here])
+    if not np.isfinite(period):
+        return np.zeros(0)
+    order = np.flatnonzero(here)[np.lexsort((time_s[here], target[here]))]
+    when, contrast = _contrasts(time_s[order], target[order], y[order], period)
+    if len(when) < _LEAST_TURNS:
+        return np.zeros(0)
+    start = float(when.min())
+    turn = ((when - start) / period).astype(int)
+    return start + period * _peaks(_sums(turn, contrast))
+
+
+def _contrasts(time_s: Array, target: Array, y: Array, period: float) -> tuple[Array, Array]:
+    """Plots with enough around them, and mean after minus mean before in its own deviations."""
+    level = np.median(y)
+    scale = max(_MAD_TO_SD * float(np.median(np.abs(y - level))), 1e-12)
+    summed = np.concatenate([[0.0], np.cumsum(np.clip((y - level) / scale, -_CLIP, _CLIP))])
+    rows = np.arange(len(y))
+    first = np.maximum.accumulate(np.where(np.diff(target, prepend=-1) != 0, rows, 0))
+    end = rows + AFTER
+    begin = np.maximum(rows - BEFORE, first)
+    # Twice the time that these plots should take: a target that was lost meanwhile tells less.
+    last = np.minimum(end, len(y)) - 1
+    whole = (end <= len(y)) & (target[last] == target) & (rows - begin >= LEAST_BEFORE)
+    whole &= time_s[last] - time_s[begin] < 2.0 * (AFTER + BEFORE) * period
+    r, b = rows[whole], begin[whole]
+    if not len(r):
+        return np.zeros(0), np.zeros(0)
+    after = (summed[r + AFTER] - summed[r]) / AFTER
+    before = (summed[r] - summed[b]) / (r - b)
+    raw = (after - before) / np.sqrt(1.0 / AFTER + 1.0 / (r - b))
+    spread = max(_MAD_TO_SD * float(np.median(np.abs(raw))), 1e-12)
+    return time_s[r], np.clip(raw / spread, -_MOST, _MOST)
+
+
+def _sums(turn: Array, contrast: Array) -> Array:
+    """(turns,) sum of each turn's contrasts in its own standard deviations."""
+    count = np.bincount(turn)
+    total = np.bincount(turn, weights=contrast)
+    sums = total / np.sqrt(np.maximum(count, 1))
+    busy = sums[count >= 3]
+    wider = _MAD_TO_SD * float(np.median(np.abs(busy))) if len(busy) >= _LEAST_TURNS else 1.0
+    return sums / max(wider, 1.0)
+
+
+def _peaks(sums: Array) -> Array:
+    """Turns whose sum passes the threshold, the largest of each neighbourhood."""
+    passed = np.flatnonzero(np.abs(sums) > _THRESHOLD)
+    groups = np.split(passed, np.flatnonzero(np.diff(passed) > _APART) + 1)
+    return np.array([group[np.argmax(np.abs(sums[group]))] for group in groups if len(group)])
