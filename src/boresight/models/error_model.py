@@ -1,0 +1,116 @@
+"""Error models: what a sensor's error is taken to be, and what is made of it. Frozen data.
+
+Paper: kashyap section 2.1, (4) and (5).
+Differs from it: the paper says neither what the error's process noise is, nor which estimate
+corrects a plot, nor what happens without a reference, nor how R is windowed: each is a field of
+`ErrorModel`, and `MODELS` names whole readings.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Literal, get_args, get_origin
+
+import numpy as np
+
+from boresight.errors import UsageError, unknown
+from boresight.models.checks import not_negative
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorModel:
+    """What a sensor's error is taken to be, and what is made of it.
+
+    Attributes:
+        frame: of the channels: range and angles (EMEKF), or the track frame's axes (ECMKF).
+        state: an error that drifts, or one whose rate drifts.
+        drift_m, drift_deg: of a bias, by how much it changes in a second, as a random walk
+            (standard deviation, m/√s and °/√s); of a rate, its acceleration (m/s², °/s²).
+        spread: of the error before the first reference, in standard deviations of a plot.
+        rate_spread: of its rate, in standard deviations of a plot each second.
+        odds: against there being a bias at all. References change them, and a plot is corrected
+            by the share of the error that they make probable. None: by all of it.
+        correction: what corrects a plot: the error as predicted, as estimated with the same scan's
+            reference (which so leaks into the plot), or nothing.
+        outage: what corrects where the reference is missing: the error as it was last, as its
+            model moves it, or nothing. Its variance grows in any case.
+        window: differences that the noise of plots is estimated from; None: it is the sensor's.
+        warm_up: differences before that estimate is used; None: a full window.
+        floor: share of the sensor's own covariance in the estimate, which is never below it.
+        noise: whether covariances between channels are dropped or kept.
+        source: what the window holds: reference minus plot, or what that is off the error as
+            predicted (innovation) or as estimated (residual).
+        reference_m: standard deviation of the reference, along each axis.
+    """
+
+    frame: Literal["polar", "cartesian"] = "polar"
+    state: Literal["bias", "rate"] = "bias"
+    drift_m: float = 0.05
+    drift_deg: float = 0.0005
+    spread: float = 10.0
+    rate_spread: float = 0.1
+    odds: float | None = 1_000.0
+    correction: Literal["prediction", "same epoch", "none"] = "prediction"
+    outage: Literal["hold", "coast", "zero"] = "hold"
+    window: int | None = None
+    warm_up: int | None = None
+    floor: float = 0.0
+    noise: Literal["diagonal", "full"] = "diagonal"
+    source: Literal["difference", "innovation", "residual"] = "difference"
+    reference_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Numbers become floats, and what cannot be is refused."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if get_origin(field.type) is Literal and value not in get_args(field.type):
+                raise UsageError(
+                    f"{field.name}={value!r} is unknown",
+                    next_step=f"use one of {', '.join(get_args(field.type))}",
+                )
+            if field.type in (float, float | None) and value is not None:
+                object.__setattr__(self, field.name, not_negative(field.name, value))
+        self._check_window()
+
+    def _check_window(self) -> None:
+        for name in ("window", "warm_up"):
+            value = getattr(self, name)
+            is_length = isinstance(value, int) and not isinstance(value, bool) and value >= 2
+            if value is not None and not is_length:
+                raise UsageError(
+                    f"{name}={value!r} is no number of differences",
+                    why="a covariance needs at least 2",
+                )
+        if self.warm_up and not (self.window and self.warm_up <= self.window):
+            raise UsageError(
+                f"warm_up={self.warm_up} with window={self.window}",
+                why="a window holds no more differences than it is long",
+            )
+        if self.noise == "full" and self.frame == "polar":
+            raise UsageError(
+                "the noise of polar plots has no covariances here",
+                why="filters take the noises of range and angles as independent",
+                next_step='use noise="diagonal", or frame="cartesian"',
+            )
+
+
+_KASHYAP = ErrorModel(
+    state="rate",
+    drift_m=0.5,  # Q = 0.25 is its square, taken literally in every channel (erratum K7)
+    drift_deg=float(np.degrees(0.5)),
+    spread=1.0,
+    odds=None,
+    correction="same epoch",
+    outage="coast",
+    window=10,
+)
+MODELS = {
+    "random walk": ErrorModel(),
+    "random walk, always": ErrorModel(odds=None),
+    "kashyap": _KASHYAP,
+}
+
+
+def lookup(name: str) -> ErrorModel:
+    """The error model of that name; UsageError with the nearest valid name if there is none."""
+    if name in MODELS:
+        return MODELS[name]
+    raise unknown("error model", name, MODELS)
