@@ -29,6 +29,7 @@ _WHERE = {
         "WithHeightOffset",
     ],
     "models.coordinates": ["CartesianPlots", "PositionSensor"],
+    "models.error_model": ["ErrorModel"],
     "models.polar": ["Given"],
     "models.sensors": ["Bearings", "Pose", "Radar"],
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
@@ -39,6 +40,7 @@ _WHERE = {
     "experiments.metrics": ["anees", "rmse"],
     "experiments.reproduce": ["reproduce"],
     "interfaces.converting": ["convert"],
+    "interfaces.error_models": ["error_model"],
     "interfaces.python": ["inspect", "read", "report", "run", "smooth", "stream", "track"],
 }
 _NAMES = {name: module for module, names in _WHERE.items() for name in names}

@@ -11,6 +11,7 @@ from boresight.experiments.scenario import Scenario as Scenario
 from boresight.experiments.simulate import simulate as simulate
 from boresight.filters.own_doppler import track_range_rate as track_range_rate
 from boresight.interfaces.converting import convert as convert
+from boresight.interfaces.error_models import error_model as error_model
 from boresight.interfaces.python import inspect as inspect
 from boresight.interfaces.python import read as read
 from boresight.interfaces.python import report as report
@@ -25,6 +26,7 @@ from boresight.models.atmosphere import ExponentialAtmosphere as ExponentialAtmo
 from boresight.models.atmosphere import NoAtmosphere as NoAtmosphere
 from boresight.models.coordinates import CartesianPlots as CartesianPlots
 from boresight.models.coordinates import PositionSensor as PositionSensor
+from boresight.models.error_model import ErrorModel as ErrorModel
 from boresight.models.motion import ConstantAcceleration as ConstantAcceleration
 from boresight.models.motion import ConstantVelocity as ConstantVelocity
 from boresight.models.motion import CoordinatedTurn as CoordinatedTurn
