@@ -1,0 +1,167 @@
+"""Pairs as the fit reads them: by channel, sorted by target, linearised at a place."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from boresight.calibration.clusters import Sums
+from boresight.calibration.pairs import Pairs
+from boresight.models.systematic import SystematicErrors, effects
+
+Array = Any
+
+MOVING = ("time_bias_s", "site_east_m", "site_north_m")  # these move the place of linearisation
+_NEAR_M = 1e-3  # a target at the radar still has a lever
+
+
+class Columns(NamedTuple):
+    """Residuals and effects.
+
+    Attributes:
+        order: (m,) rows of the pairs.
+        starts: (targets,) first row of each target that has any.
+        target: (targets,) their numbers in the pairs.
+        residual: (k, m) measured minus expected at the place of linearisation; 0 if not seen.
+        seen: (k, m) 1 where measured.
+        extra: (k, m) or (k, 1) variance that the reference adds.
+        lever: (k, m) metres for one unit of residual.
+        touch: for each channel the terms that touch it, (n_c,).
+        effect: for each channel what one unit of them adds, (n_c, m).
+        ranging: the channel that transponders delay; -1 if there is none.
+    """
+
+    order: Array
+    starts: Array
+    target: Array
+    residual: Array
+    seen: Array
+    extra: Array
+    lever: Array
+    touch: tuple[Array, ...]
+    effect: tuple[Array, ...]
+    ranging: int
+
+    @property
+    def counts(self) -> Array:
+        """(targets,) number of pairs."""
+        return np.diff(self.starts, append=len(self.order))
+
+    def by_target(self, values: Array) -> Array:
+        """(..., targets) sums of values (..., m) over each target's pairs."""
+        return np.add.reduceat(values, self.starts, axis=-1)
+
+    def after(self, terms: Array, delay: Array) -> Array:
+        """(k, m) residuals without terms (n,) and delays (targets,)."""
+        left = self.residual.copy()
+        for channel, (touch, effect) in enumerate(zip(self.touch, self.effect, strict=True)):
+            left[channel] -= terms[touch] @ effect
+        if self.ranging >= 0:
+            left[self.ranging] -= np.repeat(delay, self.counts)
+        return self.seen * left
+
+    def sums(self, weight: Array, prior: Array) -> Sums:
+        """Normal equations under weights (k, m) and prior inverse variances (n,)."""
+        n, targets = len(prior), len(self.starts)
+        normal, right = np.diag(prior), np.zeros(n)
+        cross, own, pull = np.zeros((targets, n)), np.zeros(targets), np.zeros(targets)
+        for channel, (touch, effect) in enumerate(zip(self.touch, self.effect, strict=True)):
+            weighted = effect * weight[channel]
+            normal[np.ix_(touch, touch)] += weighted @ effect.T
+            right[touch] += weighted @ self.residual[channel]
+            if channel == self.ranging:
+                cross[:, touch] = self.by_target(weighted).T
+                own = self.by_target(weight[channel])
+                pull = self.by_target(weight[channel] * self.residual[channel])
+        return Sums(normal, right, cross, own, pull)
+
+    def scores(self, influence: Array, n: int) -> Array:
+        """(targets, n) sums of effects times influence (k, m)."""
+        total = np.zeros((len(self.starts), n))
+        for channel, (touch, effect) in enumerate(zip(self.touch, self.effect, strict=True)):
+            total[:, touch] += self.by_target(effect * influence[channel]).T
+        return total
+
+    def normals(self, weight: Array, n: int) -> Array:
+        """(targets, n, n) sums of products of effects under weights (k, m)."""
+        total = np.zeros((len(self.starts), n, n))
+        ends = (*self.starts[1:], len(self.order))
+        for channel, (touch, effect) in enumerate(zip(self.touch, self.effect, strict=True)):
+            weighted = effect * weight[channel]
+            block = np.ix_(touch, touch)
+            for g, (a, b) in enumerate(zip(self.starts, ends, strict=True)):
+                total[g][block] += weighted[:, a:b] @ effect[:, a:b].T
+        return total
+
+    def some(self, step: int) -> "Columns":
+        """Every so-manieth pair, as one target: what a start is made from."""
+        return self._replace(
+            order=self.order[::step],
+            starts=self.starts[:1],
+            target=self.target[:1],
+            residual=self.residual[:, ::step],
+            seen=self.seen[:, ::step],
+            lever=self.lever[:, ::step],
+            effect=tuple(effect[:, ::step] for effect in self.effect),
+        )
+
+
+def columns(pairs: Pairs, terms: tuple[str, ...], moved: Array) -> Columns:
+    """Arrange pairs, linearised where the moving ones of the terms (n,) put the targets."""
+    order = np.argsort(pairs.target, kind="stable")
+    sorted_pairs = pairs.take(order)
+    target, starts = np.unique(sorted_pairs.target, return_index=True)
+    known = SystematicErrors(terms=terms, estimate=moved, cov=np.zeros((len(terms), len(terms))))
+    placed = replace(sorted_pairs, position=_place(sorted_pairs, known))
+    touch, effect = _effects(placed, terms)
+    residual = placed.residuals().T
+    for channel, (of, each) in enumerate(zip(touch, effect, strict=True)):
+        residual[channel] += np.where(np.isin(of, _moving(terms)), moved[of], 0.0) @ each
+    seen = np.isfinite(residual)
+    lever = _lever(placed)
+    accuracy = np.nan_to_num(placed.accuracy_m)
+    return Columns(
+        order=order,
+        starts=starts,
+        target=target,
+        residual=np.where(seen, residual, 0.0),
+        seen=seen.astype(float),
+        extra=(accuracy / lever) ** 2 if accuracy.any() else np.zeros((len(lever), 1)),
+        lever=lever,
+        touch=touch,
+        effect=effect,
+        ranging=pairs.channels.index("range_m") if "range_m" in pairs.channels else -1,
+    )
+
+
+def _moving(terms: tuple[str, ...]) -> list[int]:
+    return [i for i, term in enumerate(terms) if term in MOVING]
+
+
+def _place(pairs: Pairs, known: SystematicErrors) -> Array:
+    """(m, 3) where the targets were when they were measured, seen from where the antenna is."""
+    site = np.array([known.value("site_north_m"), known.value("site_east_m"), 0.0])
+    return pairs.position - known.value("time_bias_s") * pairs.velocity - site
+
+
+def _effects(pairs: Pairs, terms: tuple[str, ...]) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """For each channel, which terms touch it and what one unit of each adds."""
+    place, speed = pairs.position.T, pairs.velocity.T
+    table = [effects(term, place, speed) for term in terms]
+    touch = [[i for i, row in enumerate(table) if channel in row] for channel in pairs.channels]
+    effect = [
+        np.array([table[i][channel] for i in of]).reshape(len(of), len(pairs))
+        for of, channel in zip(touch, pairs.channels, strict=True)
+    ]
+    return tuple(np.array(of, dtype=int) for of in touch), tuple(effect)
+
+
+def _lever(pairs: Pairs) -> Array:
+    """(k, m) metres that one unit of each channel displaces."""
+    ground = np.hypot(pairs.position[:, 0], pairs.position[:, 1])
+    lever = {
+        "range_m": np.ones(len(pairs)),
+        "azimuth_rad": ground,
+        "elevation_rad": np.hypot(ground, pairs.position[:, 2]),
+    }
+    return np.maximum(np.array([lever[channel] for channel in pairs.channels]), _NEAR_M)
