@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boresight.errors import UsageError
+
 if TYPE_CHECKING:
     import polars as pl
 
@@ -48,3 +50,28 @@ def unusable(plots: "pl.DataFrame") -> Array:
         ("garbled code", garbled),
     ]
     return np.select([holds for _, holds in reasons], [name for name, _ in reasons], default="")
+
+
+def one_sensor(plots: "pl.DataFrame", sensor: str | None, remarks: list[str]) -> "pl.DataFrame":
+    """The plots of one sensor: the named one, else the busiest, which is then remarked.
+
+    Raises:
+        UsageError: the sensor is not in the table.
+    """
+    import polars as pl
+
+    if "sensor" not in plots.columns:
+        return plots
+    counts = plots["sensor"].value_counts(sort=True)
+    names = counts["sensor"].to_list()
+    if sensor is not None and sensor not in names:
+        raise UsageError(
+            f"there is no sensor {sensor!r} in the plots",
+            next_step=f"use one of {', '.join(map(str, names))}",
+        )
+    if sensor is None and len(names) > 1:
+        remarks.append(
+            f"The file holds plots of {len(names)} sensors ({', '.join(map(str, names))}); "
+            f"{names[0]}, the busiest, was taken. Choose with --sensor."
+        )
+    return plots.filter(pl.col("sensor") == (sensor or names[0])) if names else plots

@@ -14,11 +14,12 @@ import numpy as np
 
 from boresight.errors import UsageError
 from boresight.filters.method import Filter
+from boresight.formats.usable import one_sensor
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
 from boresight.tracking import tables
 from boresight.tracking.beside import Flown, side_by_side
-from boresight.tracking.case import Case, one_sensor, prepare
+from boresight.tracking.case import Case, prepare
 from boresight.tracking.choose import choose_noise, recursion_for, warmed_up
 from boresight.tracking.flight import Filtered, fly
 from boresight.tracking.noise import Noise, measure
