@@ -17,7 +17,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from boresight.errors import UsageError
-from boresight.filters.error_step import Case, step
+from boresight.filters import error_step
+from boresight.filters.error_beside import Case
 from boresight.lanes import Kernel, Rate, Scalar, Vector, make_kernel, pack_states, trace
 from boresight.models.coordinates import CartesianPlots
 from boresight.models.error_model import MODELS, ErrorModel, lookup
@@ -84,7 +85,9 @@ def correct(
     rated = {name: rate_of(name, *pair) for name, pair in given.items()}
     rates = tuple(sorted((name, rate) for name, (rate, _) in rated.items()))
     values = {name: value for name, (_, value) in rated.items()} | {"z": z, "reference": known}
-    empty = {name: np.zeros((len(z), *leaf.shape)) for name, leaf in case.layout.items()}
+    empty = {
+        name: np.zeros((len(z), *leaf.shape)) for name, leaf in error_step.layout(case).items()
+    }
     kernel = _kernel(_Key(case), rates)
     start = pack_states(kernel.program.state, empty)
     told = kernel.run(start, values, z.shape[1], threads=threads)[1]
@@ -147,9 +150,9 @@ def _kernel(key: _Key, rates: tuple[tuple[str, Rate], ...]) -> Kernel:
     return make_kernel(
         trace(
             partial(_recorded, case),
-            state=case.layout,
+            state=error_step.layout(case),
             inputs=inputs,
-            outputs={name: (leaf, Rate.EACH) for name, leaf in case.told.items()},
+            outputs={name: (leaf, Rate.EACH) for name, leaf in error_step.told(case).items()},
         )
     )
 
@@ -157,4 +160,4 @@ def _kernel(key: _Key, rates: tuple[tuple[str, Rate], ...]) -> Kernel:
 def _recorded(case: Case, state: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
     model = with_numbers(case.model, "model", inputs)
     sensor = with_numbers(case.sensor, "sensor", inputs)
-    return step(replace(case, model=model, sensor=sensor), state, inputs)
+    return error_step.step(replace(case, model=model, sensor=sensor), state, inputs)

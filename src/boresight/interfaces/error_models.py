@@ -1,7 +1,7 @@
 """The verb `error_model`: plots beside a reference, and plots without what the sensor adds."""
 
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 

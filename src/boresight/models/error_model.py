@@ -28,6 +28,8 @@ class ErrorModel:
         rate_spread: of its rate, in standard deviations of a plot each second.
         odds: against there being a bias at all. References change them, and a plot is corrected
             by the share of the error that they make probable. None: by all of it.
+        alarm: at which sum of normalised innovations (Page's test) an error is taken to have
+            changed, and is sought anew from its widest spread. None: it only drifts.
         correction: what corrects a plot: the error as predicted, as estimated with the same scan's
             reference (which so leaks into the plot), or nothing.
         outage: what corrects where the reference is missing: the error as it was last, as its
@@ -47,7 +49,8 @@ class ErrorModel:
     drift_deg: float = 0.0005
     spread: float = 10.0
     rate_spread: float = 0.1
-    odds: float | None = 1_000.0
+    odds: float | None = 100.0
+    alarm: float | None = 8.0
     correction: Literal["prediction", "same epoch", "none"] = "prediction"
     outage: Literal["hold", "coast", "zero"] = "hold"
     window: int | None = None
@@ -98,6 +101,7 @@ _KASHYAP = ErrorModel(
     drift_deg=float(np.degrees(0.5)),
     spread=1.0,
     odds=None,
+    alarm=None,
     correction="same epoch",
     outage="coast",
     window=10,
