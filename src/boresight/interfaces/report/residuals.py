@@ -107,11 +107,11 @@ def _panel(used: "pl.DataFrame", quantity: Quantity, against: Against) -> Panel:
     reach = MARGIN_SDS * float(np.nanmedian(sd))
     count, centre = len(bounds) - 1, (bounds[1:] + bounds[:-1]) / 2
     cell = cells(x, bounds)
-    found = _centres(cell, residual, sd, count)
+    stated = centres(cell, sd, count).median
     data = [
-        _density(x, residual, bounds, reach),
-        *(_spread(centre, sign * found.sd) for sign in (-2, 2)),
-        _median(centre, found, quantity),
+        density(x, residual, bounds, (-reach, reach)),
+        *(_spread(centre, sign * stated) for sign in (-2, 2)),
+        median_line(centre, centres(cell, residual, count), quantity.unit),
     ]
     layout = _layout(quantity, against, bounds, reach)
     alt = f"{quantity.words} residual against {against.words}: density, median and twice the sd"
@@ -129,43 +129,47 @@ def robust_sd(values: Floats) -> float:
 
 
 class Centre(NamedTuple):
-    """Of each cell (cells,): median, half its 95 % interval, the filter's median sd, plots."""
+    """Of each cell (cells,): median, half its 95 % interval, plots."""
 
     median: Floats
     error: Floats
-    sd: Floats
     number: Floats
 
 
-def _centres(cell: NDArray[np.intp], residual: Floats, sd: Floats, count: int) -> Centre:
-    """Return where the residuals of each cell lie; NaN where they are too few.
+def centres(cell: NDArray[np.intp], values: Floats, count: int) -> Centre:
+    """Return where the values of each cell lie; NaN where they are too few.
 
-    The interval takes residuals as independent, which those of one turning target are not.
+    The interval takes values as independent, which those of one turning target are not.
     """
     order = np.argsort(cell, kind="stable")
     cuts = np.searchsorted(cell[order], np.arange(1, count))
-    parts = zip(np.split(residual[order], cuts), np.split(sd[order], cuts), strict=True)
-    return Centre(*np.array([_centre(*part) for part in parts]).T)
+    return Centre(*np.array(list(map(_centre, np.split(values[order], cuts)))).T)
 
 
-def _centre(residual: Floats, sd: Floats) -> tuple[float, float, float, float]:
-    number = len(residual)
+def _centre(values: Floats) -> tuple[float, float, float]:
+    values = values[np.isfinite(values)]
+    number = len(values)
     if number < FEWEST:
-        return np.nan, np.nan, np.nan, number
-    error = NORMAL_95 * MEDIAN_COST * robust_sd(residual) / np.sqrt(number)
-    return float(np.median(residual)), float(error), float(np.nanmedian(sd)), number
+        return np.nan, np.nan, number
+    error = NORMAL_95 * MEDIAN_COST * robust_sd(values) / np.sqrt(number)
+    return float(np.median(values)), float(error), number
 
 
-def _density(x: Floats, residual: Floats, bounds: Floats, reach: float) -> Chart:
-    steps = np.linspace(-reach, reach, ROWS + 1)
-    counts, _, _ = np.histogram2d(residual, x, bins=(steps, bounds))
+def density(x: Floats, residual: Floats, bounds: Floats, ends: tuple[float, float]) -> Chart:
+    """Count the residuals in cells of equal size, between `bounds` across and `ends` upwards."""
+    low, high = ends
+    columns, step = len(bounds) - 1, (high - low) / ROWS
+    inside = (residual >= low) & (residual <= high)
+    row = np.minimum(((residual[inside] - low) / step).astype(int), ROWS - 1)
+    flat = row * columns + cells(x[inside], bounds)
+    counts = np.bincount(flat, minlength=ROWS * columns).reshape(ROWS, columns)
     share = np.where(counts > 0, np.log10(np.maximum(counts, 1)) + 0.15, np.nan)
     return {
         "type": "heatmap",
         "x0": float(bounds[0] + bounds[1]) / 2,
         "dx": float(bounds[1] - bounds[0]),
-        "y0": float(steps[0] + steps[1]) / 2,
-        "dy": float(steps[1] - steps[0]),
+        "y0": low + step / 2,
+        "dy": step,
         "z": charts.short(share, 7),
         "colorscale": charts.DENSITY,
         "showscale": False,
@@ -179,9 +183,10 @@ def _spread(x: Floats, y: Floats) -> Chart:
     return charts.line(charts.typed(x, "f8"), charts.short(y), charts.INK, hoverinfo="skip") | style
 
 
-def _median(x: Floats, found: Centre, quantity: Quantity) -> Chart:
+def median_line(x: Floats, found: Centre, unit: str) -> Chart:
+    """Draw the median of each cell with its interval."""
     error = charts.short(found.error)
-    ends = f"%{{y:.3~g}} ± %{{customdata[0]:.2~g}} {quantity.unit}"
+    ends = f"%{{y:.3~g}} ± %{{customdata[0]:.2~g}} {unit}"
     return charts.line(
         charts.typed(x, "f8"),
         charts.short(found.median),

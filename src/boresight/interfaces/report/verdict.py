@@ -46,7 +46,7 @@ def sentences(
         _use(result),
         _targets(result),
         _fixed(result),
-        _damage(inspection or {}),
+        damage(inspection or {}),
     )
     return [sentence for part in parts for sentence in part]
 
@@ -218,7 +218,8 @@ def _full_title(row: dict[str, Any]) -> str:
     return f"{address} ({name})" if address and address != name else name
 
 
-def _damage(inspection: dict[str, Any]) -> Iterator[Sentence]:
+def damage(inspection: dict[str, Any]) -> Iterator[Sentence]:
+    """Say how many bytes of the file could not be read."""
     if "skipped_bytes" not in inspection:
         return
     skipped, whole = inspection["skipped_bytes"], inspection.get("bytes", 0)

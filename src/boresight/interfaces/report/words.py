@@ -132,3 +132,20 @@ def panel(name: str, caption: str, *, alt: str) -> str:
         f'<figure><div class="chart" id="{name}" role="img" aria-label="{escape(alt)}"></div>'
         f"<figcaption>{caption}</figcaption></figure>"
     )
+
+
+def decimals(sd: float) -> int:
+    """Digits after the point that show two figures of a standard deviation."""
+    return min(max(1 - math.floor(math.log10(sd)), 0), 6) if math.isfinite(sd) and sd > 0 else 3
+
+
+def with_unit(value: float, places: int, unit: str) -> str:
+    """Render a signed number to so many places, its unit after it: `+0.535°`, `-2.70 m`."""
+    return f"{value:+z,.{places}f}" + (unit if unit == "°" else f" {unit}")
+
+
+def interval(ends: tuple[float, float], places: int, unit: str) -> str:
+    """Render an interval: `+0.515° to +0.555°`; in words where it has no ends."""
+    if not all(map(math.isfinite, ends)):
+        return "no interval: too few targets"
+    return f"{with_unit(ends[0], places, unit)} to {with_unit(ends[1], places, unit)}"

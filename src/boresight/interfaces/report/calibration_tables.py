@@ -1,0 +1,141 @@
+"""The tables of a calibration: terms, directions, drift, steps, and plots without a pair."""
+
+from typing import TYPE_CHECKING
+
+from boresight.interfaces.report.calibration_charts import proven
+from boresight.interfaces.report.calibration_scale import Typical
+from boresight.interfaces.report.words import (
+    Cell,
+    clock,
+    decimals,
+    figure,
+    interval,
+    number_cell,
+    percent,
+    table,
+    text_cell,
+    with_unit,
+)
+from boresight.models.systematic import TERMS
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from boresight.calibration.result import Calibration, TermFound
+
+UNITS = {"range_m": "m", "azimuth_deg": "°", "elevation_deg": "°"}
+NOTHING = Cell("–", is_figure=True)
+
+
+def terms(calibration: "Calibration", typical: Typical) -> str:
+    """Every term; one that is not observable has no figure at all."""
+    heads = ["error", "estimate", "95 % interval", "sd", "sd if independent"]
+    heads += [f"m at {typical.words()}", "finding"]
+    shown = proven(calibration.terms)
+    rows = [
+        _term(name, each, each.estimate * typical.metres(name), is_proven=name in shown)
+        for name, each in calibration.terms.items()
+    ]
+    marks = ["" if each.observable else ' class="unseen"' for each in calibration.terms.values()]
+    caption = "Systematic errors, measured minus true"
+    return table(caption, heads, rows, name="bias-table", row_attributes=marks)
+
+
+def _term(name: str, term: "TermFound", moved_m: float, *, is_proven: bool) -> list[Cell]:
+    kind, places = TERMS[name], decimals(term.sd)
+    if not term.observable:
+        return [text_cell(kind.words), *[NOTHING] * 5, Cell("not observable: no number to use")]
+    estimate = with_unit(term.estimate, places, kind.unit)
+    cells = [
+        Cell(f"<b>{estimate}</b>" if is_proven else estimate, is_figure=True),
+        Cell(interval(term.ci95, places, kind.unit), is_figure=True),
+        Cell(_sd(term.sd), is_figure=True),
+        Cell(_sd(term.independent_sd), is_figure=True),
+        Cell(f"{moved_m:+z,.{max(decimals(abs(moved_m) / 10), 0)}f}", is_figure=True),
+    ]
+    finding = "<b>error</b>" if is_proven else "none shows itself"
+    return [text_cell(kind.words), *cells, Cell(finding)]
+
+
+def _sd(value: float) -> str:
+    return f"{value:,.{decimals(value)}f}" if value < float("inf") else "–"
+
+
+def directions(calibration: "Calibration") -> str:
+    """The combinations that cannot be told apart."""
+    if not calibration.directions:
+        return "<p>Every error is told apart from every other.</p>"
+    rows = [
+        [
+            Cell("hardly told" if each.observable else "<b>not told</b>"),
+            text_cell(each.words),
+            text_cell(", ".join(_weight(*one) for one in each.weights.items())),
+            number_cell(each.correlation, 2),
+        ]
+        for each in calibration.directions
+    ]
+    heads = ["", "in words", "together these change nothing, or hardly", "correlation"]
+    return table("What these pairs cannot tell apart", heads, rows, name="direction-table")
+
+
+def _weight(name: str, weight: float) -> str:
+    unit = TERMS[name].unit
+    value = ("+" if weight > 0 else "−") + figure(abs(weight), 2)
+    return f"{TERMS[name].words} {value}{'' if unit == '°' else ' '}{unit}"
+
+
+def drift(frame: "pl.DataFrame | None") -> str:
+    """How fast the errors change, with intervals."""
+    if frame is None or frame.is_empty():
+        return ""
+    rows = [
+        [
+            text_cell(row["channel"].rsplit("_", 1)[0]),
+            *_change(row["per_hour"], row, UNITS.get(row["channel"], "") + "/h"),
+        ]
+        for row in frame.to_dicts()
+    ]
+    return table("Drift", ["channel", "per hour", "95 % interval", "finding"], rows)
+
+
+def steps(frame: "pl.DataFrame | None") -> str:
+    """Where the errors change at once."""
+    if frame is None or frame.is_empty():
+        return ""
+    rows = [
+        [
+            text_cell(row["channel"].rsplit("_", 1)[0]),
+            Cell(clock(row["time_s"]), is_figure=True),
+            *_change(row["size"], row, UNITS.get(row["channel"], "")),
+        ]
+        for row in frame.to_dicts()
+    ]
+    return table("Steps", ["channel", "at, UTC", "size", "95 % interval", "finding"], rows)
+
+
+def _change(value: float, row: dict[str, float], unit: str) -> list[Cell]:
+    places, ends = decimals(row["sd"]), (row["low"], row["high"])
+    is_proven = ends[0] > 0 or ends[1] < 0
+    return [
+        Cell(with_unit(value, places, unit), is_figure=True),
+        Cell(interval(ends, places, unit), is_figure=True),
+        Cell("interval without zero" if is_proven else "none shows itself"),
+    ]
+
+
+def dropped(calibration: "Calibration") -> str:
+    """Plots that made no pair, by reason, most first."""
+    counts = {name: each for name, each in calibration.dropped.items() if each}
+    if not counts:
+        return "<p>Every plot made a pair.</p>"
+    total = calibration.pairs + sum(counts.values())
+    rows = [
+        [
+            text_cell(name.replace("_", " ")),
+            number_cell(each),
+            Cell(percent(each, total), is_figure=True),
+        ]
+        for name, each in sorted(counts.items(), key=lambda item: -item[1])
+    ]
+    caption = f"Plots and reports that made no pair, beside {figure(calibration.pairs)} pairs"
+    return table(caption, ["reason", "number", "share"], rows, name="dropped-table")
