@@ -29,6 +29,7 @@ from boresight.lanes import (
 from boresight.lanes.program import Slot
 from boresight.maths import Gaussian, elimination, select
 from boresight.models.components import Component
+from boresight.models.considered import own_states
 from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, structure, with_numbers
 from boresight.models.sensors import Sensor
@@ -133,7 +134,8 @@ class Recursion:
         post, surprise = self.method.update(prior, z, motion, sensor)
         told = self.method.output(post, motion, sensor)
         results = surprise._asdict() | {"mean": told.mean, "cov": told.cov, "inside": inside}
-        results["status"] = status_of(told.mean, told.cov)
+        own = own_states(motion)
+        results["status"] = status_of(told.mean[:own], told.cov[:own, :own])
         results |= {f"kept_{name}": leaf for name, leaf in post.items()}
         results["summary"] = np.array([results[name] for name in SUMMARY])
         upper = told.cov[np.triu_indices(len(told.mean))]

@@ -1,4 +1,4 @@
-"""The plots of one radar made ready to track: sorted by identity, the air's delay taken out."""
+"""The plots of one radar made ready to track: sorted by identity, air and errors taken out."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -9,7 +9,9 @@ from boresight.errors import DataError
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
 from boresight.models.sensors import Radar
+from boresight.models.systematic import SystematicErrors
 from boresight.tracking import tables
+from boresight.tracking.corrections import corrected
 from boresight.tracking.flight import Flights
 from boresight.tracking.identity import Sorted, sort_by_identity
 from boresight.tracking.noise import steady, straight_by_roll
@@ -55,8 +57,20 @@ class Case:
         return tables.column(self.plots, name, np.nan)[self.found.row]
 
 
-def prepare(plots: "pl.DataFrame", site: Site, atmosphere: Atmosphere | None) -> Case:
-    """Sort the plots of one radar by identity.
+def prepare(
+    plots: "pl.DataFrame",
+    site: Site,
+    atmosphere: Atmosphere | None,
+    errors: SystematicErrors | None = None,
+) -> Case:
+    """Sort the plots of one radar by identity, and correct them.
+
+    Args:
+        plots: of one radar.
+        site: where its antenna is.
+        atmosphere: whose delay is taken out of the ranges, before the errors: in this order a
+            calibration finds them.
+        errors: of the radar, whose estimate is then taken out.
 
     Raises:
         DataError: no plot can be tracked.
@@ -72,6 +86,8 @@ def prepare(plots: "pl.DataFrame", site: Site, atmosphere: Atmosphere | None) ->
     if atmosphere is not None and flights.z.shape[1] == 3:
         radar = Radar(range_m=1, azimuth_deg=1, pressure_altitude_m=1, site=site)
         flights = replace(flights, z=replace(radar, atmosphere=atmosphere).without_air(flights.z))
+    if errors is not None:
+        flights = corrected(flights, errors)
     roll = tables.column(plots, "roll_deg", np.nan)[found.row]
     half = float(flights.time.min() + flights.time.max()) / 2
     return Case(plots, found, flights, *straight_by_roll(flights, roll), half)

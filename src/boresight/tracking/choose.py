@@ -62,7 +62,14 @@ def _peak(score: Callable[[float], float]) -> float:
 
 
 def choose_noise(
-    flights: Flights, straight: Array, measured: Noise, chosen: Filter, site: Site, until: float
+    flights: Flights,
+    straight: Array,
+    measured: Noise,
+    chosen: Filter,
+    site: Site,
+    until: float,
+    *,
+    held: bool = False,
 ) -> Noise:
     """The process noise, and widening of the measured noise, of the highest likelihood.
 
@@ -73,20 +80,25 @@ def choose_noise(
         chosen: filter.
         site: of the radar.
         until: only plots before this time are used; the rest can then test the choice.
+        held: the noise of range and azimuth is known, and not widened.
     """
     rows = first_part(flights, until)
     part = Flights(flights.time[rows], flights.z[rows], flights.track[rows])
     dims = flights.z.shape[1]
 
-    @cache
-    def score(widening: float, acceleration: float) -> float:
-        noise = replace(
+    def wide(widening: float, acceleration: float) -> Noise:
+        radar = 1.0 if held else widening
+        return replace(
             measured,
-            range_m=measured.range_m * widening,
-            azimuth_deg=measured.azimuth_deg * widening,
+            range_m=measured.range_m * radar,
+            azimuth_deg=measured.azimuth_deg * radar,
             altitude_m=measured.altitude_m * widening,
             accel_mps2=acceleration,
         )
+
+    @cache
+    def score(widening: float, acceleration: float) -> float:
+        noise = wide(widening, acceleration)
         result = fly(part, recursion_for(chosen, noise, site, dims), site)
         scored = straight[rows] & warmed_up(part, result.started) & (result["dof"] > 0)
         mean = float(np.mean(result["loglik"][scored])) if scored.any() else -np.inf
@@ -100,10 +112,4 @@ def choose_noise(
         if found[0] <= best:
             break
         widening, (best, acceleration) = wider, found
-    return replace(
-        measured,
-        range_m=measured.range_m * widening,
-        azimuth_deg=measured.azimuth_deg * widening,
-        altitude_m=measured.altitude_m * widening,
-        accel_mps2=acceleration,
-    )
+    return wide(widening, acceleration)

@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from boresight.filters.consider import with_errors
 from boresight.filters.recursion import Recursion, run_recursion
 from boresight.filters.start import from_polar, one_plot
 from boresight.maths import Gaussian
 from boresight.maths.frames import Site, enu_at_height
+from boresight.models.considered import Considered, ConsideredRadar, own_states
+from boresight.models.motion import Motion
 from boresight.tracking.gating import ManoeuvreGate
 
 Array = Any
@@ -77,7 +80,7 @@ def fly(flights: Flights, recursion: Recursion, site: Site) -> Filtered:
         recursion: filter, motion and sensor, without a guard.
         site: of the radar, origin of the frame.
     """
-    m, n, k = len(flights.time), len(recursion.motion.names), len(recursion.sensor.names)
+    m, n, k = len(flights.time), own_states(recursion.motion), len(recursion.sensor.names)
     shapes = {"mean": (n,), "cov": (n, n), "innovation": (k,), "variance": (k,)}
     values = {name: np.full((m, *shapes.get(name, ())), np.nan) for name in OUTPUTS}
     started, restarts = np.zeros(m, dtype=bool), np.zeros(m, dtype=bool)
@@ -132,7 +135,8 @@ def _run(
     z[:, 0] = np.nan  # it made the start; using it again would count it twice
     estimate = run_recursion(gated(recursion, dt), z, dt, start, outputs=OUTPUTS)
     for name in OUTPUTS:
-        values[name][rows[there]] = getattr(estimate, name)[there]
+        own = tuple(slice(size) for size in values[name].shape[1:])  # errors are not the target's
+        values[name][rows[there]] = getattr(estimate, name)[there][:, *own]
 
 
 def gated(recursion: Recursion, dt: Array) -> Recursion:
@@ -153,12 +157,19 @@ def begin(z: Array, recursion: Recursion, site: Site) -> Gaussian:
     Args:
         z: (lanes, 2 or 3) first plots; an altitude that is missing is guessed from the range,
             widely. Without altitudes the track stays in the plane.
-        recursion: for the noise of the sensor.
+        recursion: for the noise of the sensor, and its errors if they are considered.
         site: of the radar.
     """
-    if recursion.motion.dims == 2:
-        return one_plot(z, recursion.motion, recursion.sensor, speed_mps=SPEED_MPS)
-    radar: Any = recursion.sensor
+    motion, sensor = recursion.motion, recursion.sensor
+    if isinstance(motion, Considered) and isinstance(sensor, ConsideredRadar):
+        return with_errors(_begin(z, motion.inner, sensor.radar, site), motion, sensor)
+    return _begin(z, motion, sensor, site)
+
+
+def _begin(z: Array, motion: Motion, radar: Any, site: Site) -> Gaussian:
+    """The target's own start."""
+    if motion.dims == 2:
+        return one_plot(z, motion, radar, speed_mps=SPEED_MPS)
     distance, azimuth, altitude = z.T
     known = np.isfinite(altitude)
     height = np.where(known, altitude, np.minimum(0.35 * distance, 5_000.0))
@@ -176,7 +187,7 @@ def begin(z: Array, recursion: Recursion, site: Site) -> Gaussian:
         ],
         axis=-1,
     )
-    n = len(recursion.motion.names)
+    n = len(motion.names)
     mean, cov = np.zeros((len(z), n)), np.zeros((len(z), n, n))
     mean[:, :3] = position
     cov[:, :3, :3] = np.einsum("bij,bj,bkj->bik", J, variances, J)

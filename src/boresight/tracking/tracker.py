@@ -4,6 +4,10 @@ Association here is by identity (24-bit address, else Mode A with continuity). T
 the catalogue; the noise it runs with is measured from the plots, and the process noise chosen on
 the first half of the recording, so that the second half can test it. Filters that are compared
 with it run on the same plots with the same noise.
+
+Where a calibration is given, plots are corrected by it and what it is uncertain of goes into the
+covariance of every track (`filters.consider`). Each track carries that alone: tracks of one radar
+err alike by it, so a difference of two tracks errs by less than their covariances add up to.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,10 +21,12 @@ from boresight.filters.method import Filter
 from boresight.formats.usable import one_sensor
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
+from boresight.models.systematic import SystematicErrors
 from boresight.tracking import tables
 from boresight.tracking.beside import Flown, side_by_side
 from boresight.tracking.case import Case, prepare
 from boresight.tracking.choose import choose_noise, recursion_for, warmed_up
+from boresight.tracking.corrections import applied, carried, carrying, moved, said
 from boresight.tracking.flight import Filtered, fly
 from boresight.tracking.noise import Noise, measure
 from boresight.tracking.result import TrackingResult
@@ -43,6 +49,8 @@ def track(
     sensor: str | None = None,
     noise: Noise | None = None,
     atmosphere: Atmosphere | None = None,
+    errors: SystematicErrors | None = None,
+    sensor_noise: tuple[float, float] | None = None,
     progress: Progress | None = None,
 ) -> TrackingResult:
     """Track every identified target of one radar.
@@ -57,6 +65,11 @@ def track(
         sensor: which sensor ("SAC/SIC") if the table has several; left out: the busiest.
         noise: of the radar and its targets; left out: found from the plots.
         atmosphere: the air whose delay is taken out of the ranges; needs altitudes.
+        errors: the radar's systematic errors, as a calibration with the same atmosphere found
+            them: plots, their times and the site are corrected by the estimate, and the filter
+            carries its covariance.
+        sensor_noise: of range, m, and azimuth, degrees, where a calibration found it; left out:
+            measured. Altitude and process noise are found from the plots all the same.
         progress: called with how much is done, of how much.
 
     Raises:
@@ -65,40 +78,49 @@ def track(
     """
     say = progress or (lambda _done, _total: None)
     remarks: list[str] = []
-    place, how, stages = site or NOWHERE, "given", 3 + len(compare)
-    case = prepare(one_sensor(plots, sensor, remarks), place, atmosphere)
+    how, stages = "given", 3 + len(compare)
+    if errors is not None:
+        site = moved(site, errors) if site else None
+        remarks.append(said(errors))
+    place, uncertain = site or NOWHERE, carried(errors)
+    case = prepare(one_sensor(plots, sensor, remarks), place, atmosphere, errors)
     if noise is None:
         say(1, stages)
-        noise, how = _find_noise(case, filter, place)
+        noise, how = _find_noise(case, filter, place, sensor_noise)
     flown: list[Flown] = []
     for done, each in enumerate((filter, *compare)):
         say(2 + done, stages)
         try:
-            flown.append(_fly(case, each, noise, place))
+            recursion = recursion_for(each, noise, place, case.flights.z.shape[1])
+            recursion = carrying(recursion, uncertain, each.name, remarks)
+            flown.append(Flown(each.name, recursion, fly(case.flights, recursion, place)))
         except UsageError as error:
             if not (flown and leave_out):
                 raise
             remarks.append(f"{each.name} is not compared: {error.what}.")
     settings = _settings(case, site, noise, how) | {"atmosphere": _air(atmosphere)}
+    settings["errors"] = applied(errors) if errors else None
     result = _result(case, flown[0], site, settings, remarks)
     rows, scores = side_by_side(case, flown, place)
     return replace(result, filters=rows, scores=scores if len(flown) > 1 else None)
 
 
-def _fly(case: Case, chosen: Filter, noise: Noise, place: Site) -> Flown:
-    recursion = recursion_for(chosen, noise, place, case.flights.z.shape[1])
-    return Flown(chosen.name, recursion, fly(case.flights, recursion, place))
-
-
-def _find_noise(case: Case, chosen: Filter, place: Site) -> tuple[Noise, str]:
-    """Noise from the plots, and a sentence that says how."""
-    measured = measure(case.flights, case.found.scan_s)
-    noise = choose_noise(case.flights, case.level(), measured, chosen, place, case.half)
+def _find_noise(
+    case: Case, chosen: Filter, place: Site, known: tuple[float, float] | None
+) -> tuple[Noise, str]:
+    """Noise from the plots, but for what is known of it, and a sentence that says how."""
+    noise = measure(case.flights, case.found.scan_s)
+    how, found = "sensor noise measured as scatter about cubics through nine plots", "widening"
+    if known:
+        noise = replace(noise, range_m=known[0], azimuth_deg=known[1])
+        how, found = "noise of range and azimuth given by the calibration", "widening of altitudes"
+    noise = choose_noise(
+        case.flights, case.level(), noise, chosen, place, case.half, held=known is not None
+    )
     flight = "downlinked roll below 2 degrees" if case.hears_roll else "no fitted acceleration"
     return noise, (
-        "sensor noise measured as scatter about cubics through nine plots; process noise and "
-        f"widening of highest likelihood with {chosen.name} in straight flight ({flight}) in the "
-        "first half"
+        f"{how}; process noise and {found} of highest likelihood with {chosen.name} in straight "
+        f"flight ({flight}) in the first half"
     )
 
 
