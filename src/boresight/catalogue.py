@@ -3,10 +3,12 @@
 import re
 from importlib import resources
 from inspect import getdoc, getmodule
+from typing import Any, NamedTuple
 
 from boresight.errors import UsageError, unknown
 from boresight.filters import ekf, kalman, mekf, sigma, spherical
 from boresight.filters.converted import Converted
+from boresight.filters.error_model import correct
 from boresight.filters.line_of_sight import LineOfSight
 from boresight.filters.method import Filter
 from boresight.filters.range_rate import RangeRate
@@ -144,6 +146,16 @@ _FILTERS = {
 }
 
 
+class _Pass(NamedTuple):
+    """What goes over plots before a filter does; fields as in `Filter`."""
+
+    formula: Any
+    paper: str = "kashyap"
+
+
+_PASSES = dict.fromkeys(("error-model", "ecmkf", "emekf"), _Pass(correct))
+
+
 def names() -> tuple[str, ...]:
     """Names of all filters."""
     return tuple(_FILTERS)
@@ -157,8 +169,11 @@ def lookup(name: str) -> Filter:
 
 
 def cite(name: str) -> dict[str, str]:
-    """Where a filter comes from: `key`, `bibtex`, and how ours `differs` from it."""
-    entry = lookup(name)
+    """Where a filter, or the error model, is from: `key`, `bibtex`, and how ours `differs`."""
+    known: dict[str, Any] = _FILTERS | _PASSES
+    if name not in known:
+        raise unknown("filter", name, known)
+    entry = known[name]
     text = (resources.files("boresight") / "papers.bib").read_text(encoding="utf-8")
     found = re.search(rf"^@\w+\{{{re.escape(entry.paper)},.*?^\}}", text, re.MULTILINE | re.DOTALL)
     if found is None:
