@@ -98,7 +98,9 @@ class Sandwich(NamedTuple):
     freedom: Array
 
 
-def sandwich(scores: Array, information: Array, prior: Array) -> Sandwich:
+def sandwich(
+    scores: Array, information: Array, prior: Array, contrasts: Array | None = None
+) -> Sandwich:
     """Covariance of an estimate whose scores are independent from target to target.
 
     Args:
@@ -106,6 +108,7 @@ def sandwich(scores: Array, information: Array, prior: Array) -> Sandwich:
             prior.
         information: (targets, n, n) of each target, delays eliminated.
         prior: (n,) inverse variances believed of the terms before any pair.
+        contrasts: (c, n) combinations to be told of instead of the terms.
 
     Returns:
         CR2 covariance [bell2002] and Satterthwaite degrees of freedom [pustejovsky2018, (13)].
@@ -118,8 +121,9 @@ def sandwich(scores: Array, information: Array, prior: Array) -> Sandwich:
     lifted = (vectors / np.sqrt(1.0 - values)[:, None, :]) @ vectors.mT
     corrected = np.einsum("gij,gj->gi", lifted, scores @ root)
     known = root.T @ np.diag(prior) @ root
-    cov = root @ (corrected.T @ corrected + known) @ root.T
-    freedom = [_freedom(axis, lifted, share, axis @ known @ axis) for axis in root]
+    axes = root if contrasts is None else contrasts @ root
+    cov = axes @ (corrected.T @ corrected + known) @ axes.T
+    freedom = [_freedom(axis, lifted, share, axis @ known @ axis) for axis in axes]
     return Sandwich(0.5 * (cov + cov.T), np.array(freedom))
 
 

@@ -1,6 +1,6 @@
 """Whether a radar errs alike in all directions and all the time: sectors, spells, drift, steps.
 
-Each number is an estimate with an interval clustered by target (`mixed`). Many are looked at, so
+Each number is an estimate with an interval clustered by target (`levels`). Many are looked at, so
 what is called more than chance must be so after the number of looks is allowed for (Bonferroni):
 a radar that is stable gets a remark in less than one recording in twenty.
 """
@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boresight.calibration import mixed, steps
+from boresight.calibration import steps
 from boresight.calibration.bins import Bins, joined
+from boresight.calibration.levels import Estimates, estimate
 from boresight.calibration.pairs import Pairs
 from boresight.calibration.residuals import Registered, at_door, medians, place, spread
 
@@ -55,7 +56,9 @@ def stability(pairs: Pairs, registration: Registered) -> Stability:
     """
     if not len(pairs):
         return Stability()
-    left = at_door(pairs, registration.after)
+    order = np.lexsort((pairs.time_s, pairs.target))
+    pairs = pairs.take(order)
+    left = at_door(pairs, registration.after[order])
     sectors, remarks = _sectors(pairs, left)
     over_time, spells = _over_time(pairs, left)
     changes, told = _changes(pairs, left)
@@ -109,12 +112,12 @@ def _by_interval(
     return pl.DataFrame(columns), said
 
 
-def _means(y: Array, bins: Bins, target: Array) -> mixed.Estimates:
+def _means(y: Array, bins: Bins, target: Array) -> Estimates:
     """Mean of each interval against the mean over all."""
     cell, who, count, mean = _cells(y, bins, target)
     X = np.eye(len(bins))[cell]
     share = np.bincount(cell, weights=count, minlength=len(bins)) / count.sum()
-    return mixed.estimate(X, mean, count, who, np.eye(len(bins)) - share)
+    return estimate(X, mean, count, who, np.eye(len(bins)) - share)
 
 
 def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ...]:
@@ -126,17 +129,16 @@ def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ..
     scale = spread(y, bins)
     off = np.abs(y - medians(y, bins)[bins.index])
     good = (bins.index >= 0) & (off <= _GROSS * np.maximum(scale, 1e-12)[bins.index])
-    width = int(target.max()) + 1
-    key = bins.index[good] * width + target[good]
-    cells, where = np.unique(key, return_inverse=True)
-    count = np.bincount(where)
-    means = [np.bincount(where, weights=x[good]) / count for x in (y, *more)]
-    return cells // width, cells % width, count.astype(float), *means
+    key = target[good] * len(bins) + bins.index[good]
+    count = np.bincount(key)
+    cells = np.flatnonzero(count)
+    means = [np.bincount(key, x[good])[cells] / count[cells] for x in (y, *more)]
+    return cells % len(bins), cells // len(bins), count[cells].astype(float), *means
 
 
-def _worst(name: str, bins: Bins, channel: str, found: mixed.Estimates, looks: int) -> list[str]:
+def _worst(name: str, bins: Bins, channel: str, found: Estimates, looks: int) -> list[str]:
     """One sentence on the intervals that differ by more than chance, and on the worst of them."""
-    beyond = np.flatnonzero(found.p() * looks < _CHANCE)
+    beyond = np.flatnonzero(found.chance() * looks < _CHANCE)
     if len(bins) < 2 or not len(beyond):
         return []
     worst = beyond[np.argmax(np.abs(found.value[beyond]))]
@@ -180,7 +182,7 @@ def _changes(pairs: Pairs, left: dict[str, Array]) -> "tuple[dict[str, pl.DataFr
     return {"drift": drift, "steps": step}, said
 
 
-def _trend(pairs: Pairs, y: Array, at: Array) -> mixed.Estimates | None:
+def _trend(pairs: Pairs, y: Array, at: Array) -> Estimates | None:
     """Slope per hour and the size of each step; None where there is no time to have one."""
     edges = np.unique(np.concatenate([_spells(pairs), at]))
     bins = joined(pairs.time_s, edges, pairs.target, rows=1, targets=1)
@@ -189,10 +191,10 @@ def _trend(pairs: Pairs, y: Array, at: Array) -> mixed.Estimates | None:
         return None
     later = [(bins.low[cell] >= t).astype(float) for t in at]
     X = np.column_stack([np.ones(len(hours)), hours - hours.mean(), *later])
-    return mixed.estimate(X, mean, count, who, np.eye(X.shape[1])[1:])
+    return estimate(X, mean, count, who, np.eye(X.shape[1])[1:])
 
 
-def _told(channel: str, at: Array, found: mixed.Estimates, looks: int) -> list[str]:
+def _told(channel: str, at: Array, found: Estimates, looks: int) -> list[str]:
     what, unit = channel.rsplit("_", 1)
     sizes = [
         f"{_number(v, unit)} ± {_number(h, unit, '')}"
@@ -202,7 +204,7 @@ def _told(channel: str, at: Array, found: mixed.Estimates, looks: int) -> list[s
         f"At {t:.1f} s the {what} of all targets steps by {size}."
         for t, size in zip(at, sizes[1:], strict=True)
     ]
-    if found.p()[0] * looks < _CHANCE:
+    if found.chance()[0] * looks < _CHANCE:
         said.append(f"The {what} drifts by {sizes[0]} an hour, beyond chance.")
     return said
 

@@ -18,19 +18,12 @@ import numpy as np
 Array = Any
 AFTER, BEFORE, LEAST_BEFORE = 5, 20, 5  # plots of a target: a step is known five turns later
 _CLIP = 4.0  # standard deviations of a plot: larger is as large, for an outlier as for a step
-_MOST = 2.7  # of one target, in standard deviations: two together stay below the threshold
-_THRESHOLD = 4.5  # standard deviations of a turn's sum: normally passed once in 150,000 turns
+_MOST = 3.3  # of one target, in standard deviations: two together stay below the threshold
+_THRESHOLD = 4.9  # standard deviations of a turn's sum: passed once in a million turns
 _MAD_TO_SD = 1.4826
+_LARGE = 10.0  # where a step is looked for once it is there: the bound above has no peak
 _APART = AFTER + BEFORE  # turns: nearer alarms are one
 _LEAST_TURNS = 30
-
-
-def turn_s(time_s: Array, target: Array) -> float:
-    """Time between two plots of one target, as the most of them have it; NaN if there is none."""
-    order = np.lexsort((time_s, target))
-    gap = np.diff(time_s[order])[np.diff(target[order]) == 0]
-    gap = gap[gap > 0.0]
-    return float(np.median(gap)) if len(gap) else float("nan")
 
 
 def find(time_s: Array, target: Array, y: Array) -> Array:
@@ -45,17 +38,19 @@ def find(time_s: Array, target: Array, y: Array) -> Array:
         (steps,) ascending: each the beginning of the turn that has the first plots after a step. A
         recording without a step has one in less than 1e-5 of its turns.
     """
-    here = np.isfinite(y)
-    period = turn_s(time_s[here], target[here])
-    if not np.isfinite(period):
+    here = np.flatnonzero(np.isfinite(y))
+    order = here[np.lexsort((time_s[here], target[here]))]
+    gap = np.diff(time_s[order])[(np.diff(target[order]) == 0) & (np.diff(time_s[order]) > 0.0)]
+    if len(gap) < _LEAST_TURNS:
         return np.zeros(0)
-    order = np.flatnonzero(here)[np.lexsort((time_s[here], target[here]))]
+    period = float(np.median(gap))
     when, contrast = _contrasts(time_s[order], target[order], y[order], period)
     if len(when) < _LEAST_TURNS:
         return np.zeros(0)
     start = float(when.min())
     turn = ((when - start) / period).astype(int)
-    return start + period * _peaks(_sums(turn, contrast))
+    bounded, whole = (np.bincount(turn, np.clip(contrast, -c, c)) for c in (_MOST, _LARGE))
+    return start + period * _peaks(_scaled(bounded, np.bincount(turn)), whole)
 
 
 def _contrasts(time_s: Array, target: Array, y: Array, period: float) -> tuple[Array, Array]:
@@ -78,21 +73,25 @@ def _contrasts(time_s: Array, target: Array, y: Array, period: float) -> tuple[A
     before = (summed[r] - summed[b]) / (r - b)
     raw = (after - before) / np.sqrt(1.0 / AFTER + 1.0 / (r - b))
     spread = max(_MAD_TO_SD * float(np.median(np.abs(raw))), 1e-12)
-    return time_s[r], np.clip(raw / spread, -_MOST, _MOST)
+    return time_s[r], raw / spread
 
 
-def _sums(turn: Array, contrast: Array) -> Array:
-    """(turns,) sum of each turn's contrasts in its own standard deviations."""
-    count = np.bincount(turn)
-    total = np.bincount(turn, weights=contrast)
-    sums = total / np.sqrt(np.maximum(count, 1))
-    busy = sums[count >= 3]
-    wider = _MAD_TO_SD * float(np.median(np.abs(busy))) if len(busy) >= _LEAST_TURNS else 1.0
-    return sums / max(wider, 1.0)
+def _scaled(total: Array, count: Array) -> Array:
+    """(turns,) sum of each turn's contrasts in its own standard deviations.
+
+    What all targets share widens them; that is believed if it is more than chance.
+    """
+    scaled = total / np.sqrt(np.maximum(count, 1))
+    busy = scaled[count > 2]
+    if not len(busy):
+        return scaled
+    wider = _MAD_TO_SD * float(np.median(np.abs(busy)))
+    chance = 2.4 * np.sqrt((AFTER + LEAST_BEFORE) / len(busy))  # two deviations of that number
+    return scaled / (wider if wider > 1.0 + chance else 1.0)
 
 
-def _peaks(sums: Array) -> Array:
-    """Turns whose sum passes the threshold, the largest of each neighbourhood."""
+def _peaks(sums: Array, whole: Array) -> Array:
+    """Turns whose sum passes the threshold; of neighbours, that with the largest whole sum."""
     passed = np.flatnonzero(np.abs(sums) > _THRESHOLD)
     groups = np.split(passed, np.flatnonzero(np.diff(passed) > _APART) + 1)
-    return np.array([group[np.argmax(np.abs(sums[group]))] for group in groups if len(group)])
+    return np.array([group[np.argmax(np.abs(whole[group]))] for group in groups if len(group)])
