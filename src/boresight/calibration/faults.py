@@ -1,0 +1,221 @@
+"""Why plots and reference do not agree: clocks, places and units that are wrong, by name.
+
+Nothing is repaired here. If far more plots agree with the reference once a clock is moved or a unit
+is changed, that is the fault, and the error says so.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import permutations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boresight.calibration.comparing import Compared, Setting, compare
+from boresight.calibration.references import Reference
+from boresight.errors import DataError
+from boresight.formats.clock import DAY_S
+from boresight.formats.schema import DEGREE, FOOT_M, NAUTICAL_MILE_M
+from boresight.formats.usable import column
+from boresight.maths import wrap
+from boresight.maths.frames import enu_from_geodetic
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Array = Any
+_HOUR_S = 3_600.0
+_ZONES = 14  # hours that a clock's zone may be off
+_TRIED = 50_000  # plots of a trial
+# What biases leave: a plot further from its target than this, by identity, is not of it.
+_RANGE_M, _RANGE_SHARE, _AZIMUTH_RAD = 2_000.0, 0.02, 0.3
+_MOVING_MPS = 3.0  # a parked target is in its place at any hour
+_FEW = {"identity": 0.5, "position": 0.1}  # share of pairs that must agree
+_ENOUGH, _MORE = 10, 2.0  # agreeing plots that name a fault, and how many times those without it
+_RATIO = 0.1  # heights in feet are 3.28 times those in metres, within this share
+_HIGH_M = 1_000.0  # above it heights and pressure altitudes differ by little of themselves
+_HIGHEST_M = 20_000.0  # most traffic is below
+_FAR_M = 100_000.0  # beyond the furthest plot
+
+
+def same_day(plots: "pl.DataFrame", reference: Reference) -> tuple[Reference, list[str]]:
+    """The reference on the day of the plots, if either clock counts from a midnight.
+
+    Times of day have no date, and each file's count from its own first midnight.
+    """
+    import polars as pl
+
+    ours, theirs = (_span(table) for table in (plots, reference.table))
+    if not any(-DAY_S < start < 2 * DAY_S for start in (ours[0], theirs[0])):
+        return reference, []
+    middle = np.rint((np.mean(ours) - np.mean(theirs)) / DAY_S)
+    days = min(
+        (middle - 1, middle, middle + 1, 0.0), key=lambda n: (-_overlap(ours, theirs, n), abs(n))
+    )
+    if days == 0:
+        return reference, []
+    table = reference.table.with_columns(pl.col("time_s") + days * DAY_S)
+    said = f"The reference's times were moved by {days:+.0f} days: it counts from another midnight."
+    return replace(reference, table=table), [said]
+
+
+def explain(plots: "pl.DataFrame", reference: Reference, setting: Setting, found: Compared) -> None:
+    """Raise the fault that keeps plots and reference from agreeing, if there is one.
+
+    Raises:
+        DataError: no plot has a partner, or most have a wrong one; it names the cause where one
+            is recognised.
+    """
+    base = _agreeing(plots, found, setting)
+    if base < max(_ENOUGH, _FEW[setting.how] * len(found.plot)):
+        tried = _some(plots)
+        trials = [*_clocks(tried, reference), *_places(tried, reference)]
+        scores = [_score(*trial[1:], setting) for trial in trials]
+        best = int(np.argmax(scores))
+        without = _score(tried, reference, setting)
+        if scores[best] >= max(_ENOUGH, _MORE * without):
+            raise _fault(trials[best][0], scores[best], without)
+    _check_heights(plots, found)
+    if not len(found.plot):
+        raise _nothing(plots, reference, setting, found)
+
+
+def _span(table: "pl.DataFrame") -> tuple[float, float]:
+    time = column(table, "time_s", np.nan)
+    time = time[np.isfinite(time)]
+    return (float(time.min()), float(time.max())) if len(time) else (0.0, 0.0)
+
+
+def _overlap(ours: tuple[float, float], theirs: tuple[float, float], days: float) -> float:
+    """Seconds that both last at once; below zero, what lies between them."""
+    shift = days * DAY_S
+    return min(ours[1], theirs[1] + shift) - max(ours[0], theirs[0] + shift)
+
+
+def _some(plots: "pl.DataFrame") -> "pl.DataFrame":
+    """No more plots than a trial needs, of one piece, from the middle."""
+    first = max(plots.height - _TRIED, 0) // 2
+    return plots.sort("time_s").slice(first, _TRIED) if first else plots
+
+
+def _agreeing(plots: "pl.DataFrame", found: Compared, setting: Setting) -> int:
+    """Number of plots that are where their target is, as far as any bias lets them be."""
+    if setting.how == "position":
+        return int((np.linalg.norm(found.velocity, axis=1) > _MOVING_MPS).sum())
+    expected = np.linalg.norm(found.position, axis=1)
+    azimuth = np.arctan2(found.position[:, 1], found.position[:, 0])
+    off = np.abs(column(plots, "range_m", np.nan)[found.plot] - expected)
+    turned = np.radians(column(plots, "azimuth_deg", np.nan)[found.plot]) - azimuth
+    near = (off < _RANGE_M + _RANGE_SHARE * expected) & (np.abs(wrap(turned)) < _AZIMUTH_RAD)
+    return int(near.sum())
+
+
+def _score(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> int:
+    return _agreeing(plots, compare(plots, reference, setting), setting)
+
+
+Trial = tuple[str, "pl.DataFrame", Reference]
+
+
+def _clocks(plots: "pl.DataFrame", reference: Reference) -> Iterator[Trial]:
+    """The reference with its clock moved by whole hours."""
+    import polars as pl
+
+    for hours in (h for n in range(1, _ZONES + 1) for h in (n, -n)):
+        seconds = hours * _HOUR_S
+        table = reference.table.with_columns(pl.col("time_s") - seconds)
+        way = "ahead of" if hours > 0 else "behind"
+        said = f"the reference's clock is {abs(seconds):.0f} s {way} the plots'"
+        yield said, plots, replace(reference, table=table)
+
+
+def _places(plots: "pl.DataFrame", reference: Reference) -> Iterator[Trial]:
+    """Latitude and longitude exchanged; ranges and azimuths in another unit."""
+    import polars as pl
+
+    swapped = reference.table.rename(
+        {"latitude_deg": "longitude_deg", "longitude_deg": "latitude_deg"}
+    ).filter(pl.col("latitude_deg").abs() <= 90.0)
+    said = "latitude and longitude are exchanged, in the reference or in the site"
+    yield said, plots, replace(reference, table=swapped)
+    units = [
+        ("range_m", FOOT_M, "the ranges are in feet, not in metres"),
+        ("range_m", 1 / FOOT_M, "the ranges were taken for feet, and are metres"),
+        ("range_m", NAUTICAL_MILE_M, "the ranges are in nautical miles, not in metres"),
+        ("range_m", 1_000.0, "the ranges are in kilometres, not in metres"),
+        ("azimuth_deg", DEGREE, "the azimuths are in radians, not in degrees"),
+    ]
+    for name, factor, said in units:
+        yield said, plots.with_columns(pl.col(name) * factor), reference
+
+
+def _fault(said: str, agree: int, without: int) -> DataError:
+    return DataError(
+        said,
+        why=f"with that put right {agree} of the plots tried agree with the reference, "
+        f"as it is {without}",
+        next_step="correct the file; nothing was changed here",
+    )
+
+
+def _check_heights(plots: "pl.DataFrame", found: Compared) -> None:
+    """Refuse heights of the reference that are feet for metres, or metres for feet."""
+    paths, row, time = found.paths, found.row, found.time
+    valid = column(plots, "altitude_valid", True).astype(bool)[found.plot]
+    told = {
+        "the reference's heights": paths.linear(paths.height, row, time),
+        "the reference's pressure altitudes": paths.linear(paths.pressure, row, time),
+        "the plots' pressure altitudes": np.where(
+            valid, column(plots, "pressure_altitude_m", np.nan)[found.plot], np.nan
+        ),
+    }
+    for upper, lower in permutations(told, 2):
+        both = (told[upper] > _HIGH_M) & (told[lower] > _HIGH_M * FOOT_M)
+        ratio = float(np.median((told[upper] / told[lower])[both])) if both.any() else np.nan
+        if both.sum() >= _ENOUGH and abs(ratio * FOOT_M - 1.0) < _RATIO:
+            raise DataError(
+                f"{upper} are {ratio:.2f} times {lower}: feet taken for metres",
+                where=f"{int(both.sum())} pairs that tell both",
+                why="a foot is 0.3048 m",
+                next_step="name the column in its own unit, such as height_ft",
+            )
+    for name, heights in told.items():
+        if np.isfinite(heights).sum() >= _ENOUGH and np.nanmedian(heights) > _HIGHEST_M:
+            raise DataError(
+                f"{name} are {np.nanmedian(heights):.0f} m in the median: no traffic flies there",
+                why="feet taken for metres look like that",
+                next_step="name the column in its own unit, such as height_ft",
+            )
+
+
+def _nothing(
+    plots: "pl.DataFrame", reference: Reference, setting: Setting, found: Compared
+) -> DataError:
+    """The error for plots of which none has a partner: no time, no place, or the reasons."""
+    ours, theirs = _span(plots), _span(reference.table)
+    if _overlap(ours, theirs, 0.0) <= 0:
+        return DataError(
+            "plots and reference do not overlap in time",
+            where=f"plots {ours[0]:.1f} to {ours[1]:.1f} s, reference {theirs[0]:.1f} to "
+            f"{theirs[1]:.1f} s",
+            next_step="record both at the same time, or name the reference of this recording",
+        )
+    paths = found.paths
+    level = np.nan_to_num(paths.height)
+    enu = enu_from_geodetic(paths.latitude, paths.longitude, level, setting.site)
+    nearest = float(np.linalg.norm(enu, axis=1).min())
+    furthest = float(np.nanmax(column(plots, "range_m", np.nan), initial=0.0))
+    if nearest > furthest + _FAR_M:
+        return DataError(
+            "plots and reference do not overlap in place",
+            where=f"the furthest plot is {furthest / 1e3:.0f} km from the site, the nearest "
+            f"report of the reference {nearest / 1e3:.0f} km",
+            next_step="check the site, and that the reference is of this region",
+        )
+    names, counts = np.unique(found.reason.astype(str), return_counts=True)
+    order = np.argsort(-counts)
+    return DataError(
+        f"no plot could be paired with the reference by {setting.how}",
+        why="; ".join(f"{counts[i]} plots: {names[i]}" for i in order),
+        next_step="boresight inspect FILE says what both files hold",
+    )
