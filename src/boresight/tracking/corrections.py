@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from boresight.errors import FormulaError, UsageError
 from boresight.filters.consider import consider
 from boresight.filters.recursion import Recursion
-from boresight.filters.steps import Updating
 from boresight.maths.frames import Site, geodetic_from_enu
 from boresight.models.systematic import TERMS, SystematicErrors
-from boresight.tracking.flight import Flights
+from boresight.tracking.flight import Filtered, Flights, fly
 
 Array = Any
+_RANGE = "range_bias_m"
 _UNSEEN = ("elevation_bias_deg",)  # no elevation is tracked
 
 
@@ -37,57 +38,83 @@ def moved(site: Site, errors: SystematicErrors) -> Site:
     )
 
 
-def carried(errors: SystematicErrors | None) -> SystematicErrors | None:
-    """The errors that plots of range, azimuth and altitude show, and that are uncertain."""
+def carried(errors: SystematicErrors | None, delay_m: float = 0.0) -> SystematicErrors | None:
+    """The errors that plots of range, azimuth and altitude show, and that are uncertain.
+
+    Args:
+        errors: of the radar.
+        delay_m: spread of the targets' own delays: to one track a bias of range like the radar's.
+    """
     if errors is None:
         return None
-    uncertain = np.diag(errors.cov) > 0.0
-    kept = [i for i, t in enumerate(errors.terms) if uncertain[i] and t not in _UNSEEN]
-    if not kept:
-        return None
+    terms = errors.terms if _RANGE in errors.terms else (*errors.terms, _RANGE)
+    cov = np.zeros((len(terms), len(terms)))
+    cov[: len(errors.terms), : len(errors.terms)] = errors.cov
+    cov[terms.index(_RANGE), terms.index(_RANGE)] += delay_m**2
+    kept = [i for i, t in enumerate(terms) if cov[i, i] > 0.0 and t not in _UNSEEN]
     return SystematicErrors(
-        terms=tuple(errors.terms[i] for i in kept),
-        estimate=errors.estimate[kept],
-        cov=errors.cov[np.ix_(kept, kept)],
+        terms=tuple(terms[i] for i in kept),
+        estimate=np.array([errors.value(terms[i]) for i in kept]),
+        cov=cov[np.ix_(kept, kept)],
     )
 
 
-def carrying(
-    recursion: Recursion, errors: SystematicErrors | None, name: str, remarks: list[str]
-) -> Recursion:
-    """The filter with the errors' uncertainty, if it can carry it; else a remark says so."""
-    if errors is None:
-        return recursion
-    if isinstance(recursion.method, Updating):
-        return consider(recursion, errors)
-    remarks.append(
-        f"{name} cannot carry the calibration's uncertainty: its plots are corrected, but its "
-        "covariance, gate and residuals take the correction for exact. ekf and mekf carry it."
+def fly_carrying(
+    flights: Flights, plain: Recursion, site: Site, errors: SystematicErrors
+) -> tuple[Recursion, Filtered, str]:
+    """Filter every track with the errors' uncertainty, if the filter can carry it.
+
+    Args:
+        flights: plots by track, corrected.
+        plain: filter, motion and sensor, without a guard.
+        site: of the radar.
+        errors: that are left.
+
+    Returns:
+        The filter as it flew, what it says, and why it could not carry the errors ("" if it could).
+    """
+    if not errors.terms:
+        return plain, fly(flights, plain, site), ""
+    try:
+        recursion = consider(plain, errors)
+        return recursion, fly(flights, recursion, site), ""
+    except UsageError as error:
+        why = error.why
+    except FormulaError:
+        why = f"with {len(errors.terms)} terms its formula is too long for a kernel"
+    return plain, fly(flights, plain, site), why
+
+
+def cannot(name: str, why: str) -> str:
+    """The remark on a filter that cannot carry a calibration's uncertainty."""
+    return (
+        f"{name} does not carry the calibration's uncertainty ({why}): its plots are corrected, "
+        "but its covariance, gate and residuals take the correction for exact. ekf and mekf "
+        "carry it."
     )
-    return recursion
 
 
-def applied(errors: SystematicErrors) -> dict[str, Any]:
-    """What was taken out of the plots, with its standard deviation and what is carried."""
-    sd, kept = np.sqrt(np.diag(errors.cov)), carried(errors)
+def applied(errors: SystematicErrors, left: SystematicErrors) -> dict[str, Any]:
+    """What was taken out of the plots, its standard deviation, and what was carried on."""
+    sd = np.sqrt(np.diag(errors.cov))
     return {
         "estimate": dict(zip(errors.terms, errors.estimate.tolist(), strict=True)),
         "sd": dict(zip(errors.terms, sd.tolist(), strict=True)),
-        "carried": list(kept.terms) if kept else [],
+        "carried": dict(zip(left.terms, np.sqrt(np.diag(left.cov)).tolist(), strict=True)),
     }
 
 
-def said(errors: SystematicErrors) -> str:
+def said(errors: SystematicErrors, left: SystematicErrors) -> str:
     """A sentence for the reader."""
-    sd, kept = np.sqrt(np.diag(errors.cov)), carried(errors)
+    sd = np.sqrt(np.diag(errors.cov))
     figures = ", ".join(
         f"{TERMS[t].words} {value:.3g} ± {spread:.2g} {TERMS[t].unit}"
         for t, value, spread in zip(errors.terms, errors.estimate, sd, strict=True)
     )
     tail = (
-        "What is uncertain of them is in every track's covariance; tracks of one radar share it, "
-        "so their errors are alike, which no track's covariance shows."
-        if kept
+        "What is uncertain of them is in every track's covariance. Tracks of one radar share it, "
+        "so their errors are alike; no track's covariance shows that."
+        if left.terms
         else "They are taken for exact."
     )
     return f"Plots were corrected by the calibration: {figures} (standard deviations). {tail}"

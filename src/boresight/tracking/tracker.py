@@ -26,7 +26,7 @@ from boresight.tracking import tables
 from boresight.tracking.beside import Flown, side_by_side
 from boresight.tracking.case import Case, prepare
 from boresight.tracking.choose import choose_noise, recursion_for, warmed_up
-from boresight.tracking.corrections import applied, carried, carrying, moved, said
+from boresight.tracking.corrections import applied, cannot, carried, fly_carrying, moved, said
 from boresight.tracking.flight import Filtered, fly
 from boresight.tracking.noise import Noise, measure
 from boresight.tracking.result import TrackingResult
@@ -51,6 +51,7 @@ def track(
     atmosphere: Atmosphere | None = None,
     errors: SystematicErrors | None = None,
     sensor_noise: tuple[float, float] | None = None,
+    delay_m: float = 0.0,
     progress: Progress | None = None,
 ) -> TrackingResult:
     """Track every identified target of one radar.
@@ -70,6 +71,8 @@ def track(
             carries its covariance.
         sensor_noise: of range, m, and azimuth, degrees, where a calibration found it; left out:
             measured. Altitude and process noise are found from the plots all the same.
+        delay_m: spread of the ranges' error from target to target, as a calibration found it;
+            carried like what is left of the radar's own.
         progress: called with how much is done, of how much.
 
     Raises:
@@ -79,10 +82,11 @@ def track(
     say = progress or (lambda _done, _total: None)
     remarks: list[str] = []
     how, stages = "given", 3 + len(compare)
-    if errors is not None:
+    left = carried(errors, delay_m)
+    if errors and left:
         site = moved(site, errors) if site else None
-        remarks.append(said(errors))
-    place, uncertain = site or NOWHERE, carried(errors)
+        remarks.append(said(errors, left))
+    place = site or NOWHERE
     case = prepare(one_sensor(plots, sensor, remarks), place, atmosphere, errors)
     if noise is None:
         say(1, stages)
@@ -91,18 +95,33 @@ def track(
     for done, each in enumerate((filter, *compare)):
         say(2 + done, stages)
         try:
-            recursion = recursion_for(each, noise, place, case.flights.z.shape[1])
-            recursion = carrying(recursion, uncertain, each.name, remarks)
-            flown.append(Flown(each.name, recursion, fly(case.flights, recursion, place)))
+            flown.append(_fly(case, each, noise, place, left, remarks))
         except UsageError as error:
             if not (flown and leave_out):
                 raise
             remarks.append(f"{each.name} is not compared: {error.what}.")
     settings = _settings(case, site, noise, how) | {"atmosphere": _air(atmosphere)}
-    settings["errors"] = applied(errors) if errors else None
+    settings["errors"] = applied(errors, left) if errors and left else None
     result = _result(case, flown[0], site, settings, remarks)
     rows, scores = side_by_side(case, flown, place)
     return replace(result, filters=rows, scores=scores if len(flown) > 1 else None)
+
+
+def _fly(
+    case: Case,
+    chosen: Filter,
+    noise: Noise,
+    place: Site,
+    left: SystematicErrors | None,
+    remarks: list[str],
+) -> Flown:
+    """One filter's pass, with what is left of the radar's errors."""
+    recursion = recursion_for(chosen, noise, place, case.flights.z.shape[1])
+    if left is None:
+        return Flown(chosen.name, recursion, fly(case.flights, recursion, place))
+    recursion, result, why = fly_carrying(case.flights, recursion, place, left)
+    remarks += [cannot(chosen.name, why)] if why else []
+    return Flown(chosen.name, recursion, result)
 
 
 def _find_noise(
