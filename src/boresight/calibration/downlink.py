@@ -8,10 +8,13 @@ turns it by b sin(2c) / (2 range), c being course minus azimuth, which traffic o
 radar averages out; an eccentricity of the encoder adds about its mean over the traffic's azimuths.
 How far that holds is worked out for each recording (`settings["moved_by"]`).
 
+What no statistics can see is how aircraft make the angle: rounded to the nearest step it is right
+in the mean, cut to the step below it reads half a step low, and the bias seems half a step greater.
+(Cut towards zero, it would differ between eastbound and westbound flight, which is looked at.)
+
 The direction of one stretch errs by the rounding of the downlinked angle, by the noise of its
 plots, and by how far the aircraft wanders about its line. Stretches are weighted for all three;
-errors of one aircraft's are taken as alike, and the interval is clustered by aircraft.
-
+errors of one aircraft are taken as alike, and the interval is clustered by aircraft.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -70,7 +73,7 @@ def from_downlink(
     good = np.flatnonzero(found.reason == "")
     if len(np.unique(found.target[good])) < FEWEST_AIRCRAFT:
         raise _too_little(dropped, lost)
-    pooled = pool(found.turned[good], found.sd[good], found.target[good], STEP_DEG)
+    pooled = _pool(found, good)
     settings = _settings(reports, found, good, pooled, lost)
     lost_plots = {name: plots for name, (_, plots) in lost.items()}
     return Calibration(
@@ -92,6 +95,10 @@ def from_downlink(
         settings=settings,
         remarks=_remarks(settings),
     )
+
+
+def _pool(found: Stretches, some: Array) -> Pooled:
+    return pool(found.turned[some], found.sd[some], found.target[some], STEP_DEG)
 
 
 def _too_little(dropped: dict[str, int], lost: dict[str, tuple[int, int]]) -> DataError:
@@ -154,6 +161,7 @@ def _settings(
         "a_residual_is_of": "a stretch of straight flight",
         "azimuth_systematic_deg": STEP_DEG / 2,
         "moved_by": _moved_by(found, good, pooled.weight),
+        "east_minus_west_deg": _east_minus_west(found, good),
         "stretch_least_s": stretches.LEAST_S,
         "stretch_fewest_plots": stretches.FEWEST_PLOTS,
         "stretch_fewest_tracks": stretches.FEWEST_TRACKS,
@@ -187,13 +195,25 @@ def _moved_by(found: Stretches, good: Array, weight: Array) -> dict[str, float]:
     }
 
 
+def _east_minus_west(found: Stretches, good: Array) -> dict[str, float] | None:
+    """Answer of eastbound flight minus that of westbound, whose downlinked tracks are negative."""
+    east = found.velocity[good, 0] > 0.0
+    sides = good[east], good[~east]
+    if min(len(np.unique(found.target[side])) for side in sides) < FEWEST_AIRCRAFT:
+        return None
+    one, other = (_pool(found, side) for side in sides)
+    sd = float(np.hypot(one.sd, other.sd))
+    return {"estimate": float(one.value - other.value), "sd": sd}
+
+
 def _remarks(settings: dict[str, Any]) -> list[str]:
     moved = settings["moved_by"]
     around = np.hypot(moved["azimuth_cos_deg"], moved["azimuth_sin_deg"])
     unseen = (
-        f"The downlinked track comes in steps of {STEP_DEG:.3f} degrees. Whether aircraft round or "
-        f"cut it cannot be told from it, so up to {STEP_DEG / 2:.3f} degrees of the azimuth bias "
-        "may be theirs. That is no part of the interval, which is statistical."
+        f"The downlinked track comes in steps of {STEP_DEG:.3f} degrees. Aircraft that round it do "
+        "no harm; where they cut it to the step below, the azimuth bias is up to "
+        f"{STEP_DEG / 2:.3f} degrees less than the estimate. That cannot be told from a bias, and "
+        "is no part of the interval, which is statistical."
     )
     others = (
         "Only the azimuth bias can be found in this way: a time bias, a range gain and a wrong "
@@ -206,4 +226,15 @@ def _remarks(settings: dict[str, Any]) -> list[str]:
         f"{settings['stretch_sd_deg']:.3f} degrees; the noise is that of single plots, and of it "
         "only what changes from plot to plot."
     )
-    return [unseen, others, rows]
+    return [unseen, *_cut_to_zero(settings["east_minus_west_deg"]), others, rows]
+
+
+def _cut_to_zero(sides: dict[str, float] | None) -> list[str]:
+    if sides is None:
+        return []
+    found = (
+        f"Eastbound flight gives {sides['estimate']:+.3f} degrees more than westbound (standard "
+        f"deviation {sides['sd']:.3f}): if all aircraft cut the angle towards zero it would be "
+        f"{STEP_DEG:.3f}."
+    )
+    return [found]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 Array = Any
 NEAREST_M = 10_000.0  # nearer, 100 m of range or height can turn a direction by 0.3 degrees
-SHORTEST_SCAN_S = 0.5
+USUAL_SCAN_S, SHORTEST_SCAN_S = 4.0, 0.5
 DUPLICATE_SCANS = 0.125  # two plots of one aircraft closer than this are one reply seen twice
 
 
@@ -32,7 +32,7 @@ class Reports:
         track: (m,) downlinked true track, rad; NaN where none came.
         speed_mps: (m,) downlinked ground speed; NaN where none came.
         roll_deg: (m,) downlinked roll; NaN where none came.
-        scan_s: median time between plots of one aircraft; NaN if none came twice.
+        scan_s: median time between plots of one aircraft; 4 s if none came twice.
     """
 
     row: Array
@@ -88,7 +88,7 @@ def _again(time: Array, target: Array) -> tuple[Array, float]:
     step = np.diff(time, prepend=-np.inf)
     step[1:][np.diff(target) != 0] = np.inf
     steps = step[np.isfinite(step) & (step > SHORTEST_SCAN_S)]
-    scan = float(np.median(steps)) if len(steps) else np.nan
+    scan = float(np.median(steps)) if len(steps) else USUAL_SCAN_S
     return step < DUPLICATE_SCANS * scan, scan
 
 
