@@ -13,6 +13,7 @@ import numpy as np
 from boresight.calibration.clusters import sandwich
 
 Array = Any
+FEWEST = 3  # targets: of fewer nobody can say how much targets differ
 _MOST = 100  # clusters: targets beyond are put together, which costs nothing but degrees of freedom
 _FAINT = 1e-9  # of the information: what no target tells stays wide instead of infinite
 
@@ -21,7 +22,7 @@ class Estimates(NamedTuple):
     """Numbers with intervals clustered by target.
 
     Attributes:
-        value, sd: (c,).
+        value, sd: (c,); sd is infinite of fewer than three targets.
         freedom: (c,) degrees of freedom of Student's law.
     """
 
@@ -56,11 +57,12 @@ def estimate(X: Array, y: Array, count: Array, target: Array, contrasts: Array) 
     ends = first[np.linspace(0, len(first), min(len(first), _MOST) + 1).astype(int)[1:-1]]
     information = np.stack([own.T @ own for own in np.split(X, ends)])
     whole = information.sum(axis=0)
-    faint = _FAINT * np.diag(whole)
+    faint = _FAINT * (np.diag(whole) + np.trace(whole) / len(whole))
     beta = np.linalg.solve(whole + np.diag(faint), X.T @ y)
     scores = np.add.reduceat(X * (y - X @ beta)[:, None], np.concatenate([[0], ends]))
     spread = sandwich(scores, information, faint, contrasts)
-    return Estimates(contrasts @ beta, np.sqrt(np.diag(spread.cov)), spread.freedom)
+    sd = np.sqrt(np.diag(spread.cov)) if len(first) >= FEWEST else np.full(len(contrasts), np.inf)
+    return Estimates(contrasts @ beta, sd, np.maximum(spread.freedom, 1.0))
 
 
 def _whitened(X: Array, y: Array, count: Array, target: Array) -> tuple[Array, Array, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from boresight.calibration import steps
 from boresight.calibration.bins import Bins, joined
-from boresight.calibration.levels import Estimates, estimate
+from boresight.calibration.levels import FEWEST, Estimates, estimate
 from boresight.calibration.pairs import Pairs
 from boresight.calibration.residuals import Registered, at_door, medians, place, spread
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 Array = Any
 _SECTOR_DEG = 10.0
 _SPELLS, _PAIRS_A_SPELL = 24, 200
-_ROWS, _TARGETS = 30, 3  # of an interval, at least: fewer targets have no interval to speak of
+_ROWS = 30  # of an interval, at least
 _GROSS = 5.0  # robust standard deviations about an interval's median: no measurement of its target
 _CHANCE = 0.01  # of a false remark, for each of sectors, spells, drift
 _HOUR_S = 3_600.0
-UNITS = {"m": " m", "deg": "°"}
+_UNITS = {"m": " m", "deg": "°"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,10 +35,11 @@ class Stability:
 
     Attributes:
         tables: `sectors` (azimuth_from_deg, azimuth_to_deg, pairs, targets, range_m, range_sd_m,
-            azimuth_deg, azimuth_sd_deg and half-widths range_ci95_m, azimuth_ci95_deg), measured
-            minus true against the mean over all; `over_time` (time_from_s, time_to_s and the same);
-            `drift` (channel, per_hour, sd, low, high); `steps` (channel, time_s, size, sd, low,
-            high). The sd are those of the estimate, clustered by target.
+            azimuth_deg, azimuth_sd_deg; half-widths range_ci95_m, azimuth_ci95_deg), the error
+            against the mean over the sectors that agree; `over_time` (time_from_s, time_to_s and
+            the same); `drift` (channel, per_hour, sd, low, high) and `steps` (channel, time_s,
+            size, sd, low, high). Each sd is that of the estimate, clustered by target, infinite of
+            fewer than three.
         remarks: what is more than chance, in sentences.
     """
 
@@ -68,12 +69,12 @@ def stability(pairs: Pairs, registration: Registered) -> Stability:
 
 def _sectors(pairs: Pairs, left: dict[str, Array]) -> "tuple[pl.DataFrame, list[str]]":
     edges = np.arange(0.0, 360.0 + _SECTOR_DEG, _SECTOR_DEG)
-    bins = joined(place(pairs)[1], edges, pairs.target, rows=_ROWS, targets=_TARGETS)
+    bins = joined(place(pairs)[1], edges, pairs.target, rows=_ROWS, targets=FEWEST)
     return _by_interval("azimuth", "deg", bins, pairs, left)
 
 
 def _over_time(pairs: Pairs, left: dict[str, Array]) -> "tuple[pl.DataFrame, list[str]]":
-    bins = joined(pairs.time_s, _spells(pairs), pairs.target, rows=_ROWS, targets=_TARGETS)
+    bins = joined(pairs.time_s, _spells(pairs), pairs.target, rows=_ROWS, targets=FEWEST)
     return _by_interval("time", "s", bins, pairs, left)
 
 
@@ -104,20 +105,32 @@ def _by_interval(
     said = []
     for channel, y in left.items():
         what, channel_unit = channel.rsplit("_", 1)
-        found = _means(y, bins, pairs.target)
+        found, beyond = _means(y, bins, pairs.target, looks=len(bins) * len(left))
         columns[channel] = found.value
         columns[f"{what}_sd_{channel_unit}"] = found.sd
         columns[f"{what}_ci95_{channel_unit}"] = found.half_width()
-        said += _worst(name, bins, channel, found, looks=len(bins) * len(left))
+        said += _worst(name, bins, channel, found, np.flatnonzero(beyond))
     return pl.DataFrame(columns), said
 
 
-def _means(y: Array, bins: Bins, target: Array) -> Estimates:
-    """Mean of each interval against the mean over all."""
+def _means(y: Array, bins: Bins, target: Array, looks: int) -> tuple[Estimates, Array]:
+    """Mean of each interval against the mean over those that agree, and which do not.
+
+    What differs beyond chance leaves the mean that all are held against, the worst first: one bad
+    sector must not make the others look bad.
+    """
     cell, who, count, mean = _cells(y, bins, target)
-    X = np.eye(len(bins))[cell]
-    share = np.bincount(cell, weights=count, minlength=len(bins)) / count.sum()
-    return estimate(X, mean, count, who, np.eye(len(bins)) - share)
+    X, each = np.eye(len(bins))[cell], np.eye(len(bins))
+    share = np.bincount(cell, weights=count, minlength=len(bins))
+    agree = np.ones(len(bins), dtype=bool)
+    while True:
+        found = estimate(X, mean, count, who, each - agree * share / (agree @ share))
+        beyond = (found.chance() * looks < _CHANCE) & (share > 0.0) & (len(bins) > 1)
+        far = np.abs(found.value) * (beyond & agree)
+        worst = far > 0.5 * far.max()
+        if not worst.any() or (agree & ~worst) @ share < 0.5 * share.sum():
+            return found._replace(value=np.where(share > 0.0, found.value, np.nan)), beyond
+        agree &= ~worst
 
 
 def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ...]:
@@ -136,28 +149,21 @@ def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ..
     return cells % len(bins), cells // len(bins), count[cells].astype(float), *means
 
 
-def _worst(name: str, bins: Bins, channel: str, found: Estimates, looks: int) -> list[str]:
+def _worst(name: str, bins: Bins, channel: str, found: Estimates, beyond: Array) -> list[str]:
     """One sentence on the intervals that differ by more than chance, and on the worst of them."""
-    beyond = np.flatnonzero(found.chance() * looks < _CHANCE)
-    if len(bins) < 2 or not len(beyond):
+    if not len(beyond):
         return []
     worst = beyond[np.argmax(np.abs(found.value[beyond]))]
-    what, unit = channel.rsplit("_", 1)
-    size = f"{_number(found.value[worst], unit)} ± {_number(found.half_width()[worst], unit, '')}"
-    if name == "azimuth":
-        where = f"sector from {bins.low[worst]:.0f}° to {bins.high[worst]:.0f}°"
-        kind = "sectors"
-    else:
-        where = f"spell from {bins.low[worst]:.0f} s to {bins.high[worst]:.0f} s"
-        kind = "spells of time"
-    told = f"In {len(beyond)} of {len(bins)} {kind} the {what} errs otherwise than on average"
-    return [f"{told}, beyond chance: by {size} in the {where}."]
+    kind, unit = {"azimuth": ("sector", "°"), "time": ("spell", " s")}[name]
+    what, size = channel.rsplit("_", 1)[0], sizes(channel, found)[worst]
+    where = f"from {bins.low[worst]:.0f}{unit} to {bins.high[worst]:.0f}{unit}"
+    how_many = f"{len(beyond)} of {len(bins)} {kind}s"
+    told = f"In {how_many} the {what} errs otherwise than in the others, beyond chance"
+    return [f"{told}: by {size} in the {kind} {where}."]
 
 
 def _changes(pairs: Pairs, left: dict[str, Array]) -> "tuple[dict[str, pl.DataFrame], list[str]]":
     """Drift and steps, estimated together so that neither is taken for the other."""
-    import polars as pl
-
     drifts, jumps, said = [], [], []
     for channel, y in left.items():
         at = steps.find(pairs.time_s, pairs.target, y)
@@ -172,14 +178,17 @@ def _changes(pairs: Pairs, left: dict[str, Array]) -> "tuple[dict[str, pl.DataFr
         drifts.append(rows[0])
         jumps += [(row[0], float(t), *row[1:]) for t, row in zip(at, rows[1:], strict=True)]
         said += _told(channel, at, found, looks=len(left))
-    numbers = ["sd", "low", "high"]
-    drift = pl.DataFrame(drifts, schema=["channel", "per_hour", *numbers], orient="row")
-    step = pl.DataFrame(
-        jumps,
-        schema={"channel": pl.String} | dict.fromkeys(["time_s", "size", *numbers], pl.Float64),
-        orient="row",
-    )
+    drift = _frame(drifts, "channel", "per_hour", "sd", "low", "high")
+    step = _frame(jumps, "channel", "time_s", "size", "sd", "low", "high")
     return {"drift": drift, "steps": step}, said
+
+
+def _frame(rows: list[Any], *names: str) -> "pl.DataFrame":
+    """Rows of a channel's name and numbers; none of them is a table too."""
+    import polars as pl
+
+    numbers = dict.fromkeys(names[1:], pl.Float64)
+    return pl.DataFrame(rows, {names[0]: pl.String, **numbers}, orient="row")
 
 
 def _trend(pairs: Pairs, y: Array, at: Array) -> Estimates | None:
@@ -187,7 +196,7 @@ def _trend(pairs: Pairs, y: Array, at: Array) -> Estimates | None:
     edges = np.unique(np.concatenate([_spells(pairs), at]))
     bins = joined(pairs.time_s, edges, pairs.target, rows=1, targets=1)
     cell, who, count, mean, hours = _cells(y, bins, pairs.target, pairs.time_s / _HOUR_S)
-    if np.ptp(hours) <= 0.0 or len(np.unique(who)) < _TARGETS:
+    if np.ptp(hours) <= 0.0 or len(np.unique(who)) < FEWEST:
         return None
     later = [(bins.low[cell] >= t).astype(float) for t in at]
     X = np.column_stack([np.ones(len(hours)), hours - hours.mean(), *later])
@@ -195,19 +204,21 @@ def _trend(pairs: Pairs, y: Array, at: Array) -> Estimates | None:
 
 
 def _told(channel: str, at: Array, found: Estimates, looks: int) -> list[str]:
-    what, unit = channel.rsplit("_", 1)
-    sizes = [
-        f"{_number(v, unit)} ± {_number(h, unit, '')}"
-        for v, h in zip(found.value, found.half_width(), strict=True)
-    ]
+    what, (slope, *jumps) = channel.rsplit("_", 1)[0], sizes(channel, found)
     said = [
-        f"At {t:.1f} s the {what} of all targets steps by {size}."
-        for t, size in zip(at, sizes[1:], strict=True)
+        f"At {t:.0f} s the {what} of all targets steps by {size}."
+        for t, size in zip(at, jumps, strict=True)
     ]
     if found.chance()[0] * looks < _CHANCE:
-        said.append(f"The {what} drifts by {sizes[0]} an hour, beyond chance.")
+        said.append(f"The {what} drifts by {slope} an hour, beyond chance.")
     return said
 
 
-def _number(value: float, unit: str, sign: str = "+") -> str:
-    return f"{value:{sign}.3g}{UNITS[unit]}"
+def sizes(channel: str, found: Estimates) -> list[str]:
+    """Each value with half of its 95 % interval, to two digits of the latter."""
+    unit = _UNITS[channel.rsplit("_", 1)[1]]
+    out = []
+    for value, half in zip(found.value, found.half_width(), strict=True):
+        digits = max(0, 1 - int(np.floor(np.log10(half)))) if 0.0 < half < np.inf else 2
+        out.append(f"{value:+.{digits}f} ± {half:.{digits}f}{unit}")
+    return out
