@@ -46,6 +46,11 @@ class Case:
     def measured(self) -> tuple[str, ...]:
         """Components of the sensor that the channels are made of."""
         wanted = POLAR[: self.dims]
+        if self.dims == 2 and POLAR[2] in self.sensor.names:
+            raise UsageError(
+                "a reference in the plane, and a radar that measures elevation",
+                next_step="give positions (x, y, z)",
+            )
         found = tuple(name for name in wanted if name in self.sensor.names)
         if not found or not (self.polar or found == wanted):
             raise UsageError(

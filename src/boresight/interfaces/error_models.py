@@ -101,6 +101,10 @@ def _positions(reference: Any) -> Array:
     """Positions of a truth, or those that were given."""
     if not hasattr(reference, "states"):
         array = np.asarray(as_number("reference", reference))
-        return np.where(np.isfinite(array), array, np.nan)
+        if np.isinf(array).any():
+            raise UsageError(
+                "the reference holds an infinite position", next_step="give NaN where unknown"
+            )
+        return array
     axes = [name in ("x_m", "y_m", "z_m") for name in reference.names]
     return reference.states[..., axes]
