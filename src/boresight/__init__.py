@@ -41,7 +41,9 @@ _WHERE = {
     "experiments.reproduce": ["reproduce"],
     "interfaces.converting": ["convert"],
     "interfaces.error_models": ["error_model"],
-    "interfaces.python": ["inspect", "read", "report", "run", "smooth", "stream", "track"],
+    "interfaces.calibration": ["calibrate", "read_calibration", "write_calibration"],
+    "interfaces.reading": ["read"],
+    "interfaces.python": ["inspect", "report", "run", "smooth", "stream", "track"],
 }
 _NAMES = {name: module for module, names in _WHERE.items() for name in names}
 __all__ = sorted([*_NAMES, "__version__"])  # noqa: PLE0605 - built from the one table above

@@ -1,19 +1,22 @@
-"""`boresight demo`: the recording that comes with the package, tracked and held against truth.
+"""`boresight demo`: the recording that comes with the package, calibrated, tracked, held to truth.
 
-The sky is invented and its truth known, and so are the radar's errors. They are not removed here,
-so every figure is given twice: against the truth, and against the truth as this radar, with its
-errors of range, azimuth and time, would see it without noise. The difference is what a calibration
-is worth.
+The sky is invented and its truth known, and so are the radar's errors. Its ADS-B reports find them
+(`calibration`). Each filter then tracks without a calibration, held against the truth and against
+the truth as this radar, with its errors of range, azimuth and time, would see it without noise; and
+the last one tracks again with the calibration, held against the truth alone.
 """
 
 import io
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
 
+from boresight.calibration import references
+from boresight.calibration.calibrate import calibrate
+from boresight.calibration.result import Calibration
 from boresight.catalogue import lookup
 from boresight.experiments.against_truth import (
     ELSEWHERE_M,
@@ -26,6 +29,7 @@ from boresight.experiments.against_truth import (
 from boresight.experiments.truth import Truth
 from boresight.formats.recording import Recording, read_recording
 from boresight.maths.frames import Site
+from boresight.models.atmosphere import ExponentialAtmosphere
 from boresight.tracking.noise import Noise
 from boresight.tracking.result import Comparison, TrackingResult
 from boresight.tracking.tracker import track
@@ -34,6 +38,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 FILTERS = ("ekf", "mekf")
+CALIBRATED = f"{FILTERS[-1]}, calibrated"
+AIR = ExponentialAtmosphere()  # the demo's radar looks through air, as every radar does
 Progress = Callable[[str], None]
 _FOLDER = files("boresight") / "demo"
 
@@ -45,9 +51,11 @@ class DemoResult:
     Attributes:
         facts: what was planted, and counts, as shipped.
         recording: what was read out of the bytes.
-        results: filter's name to its tracks.
-        comparisons: each filter against the truth.
-        as_seen: each filter against the truth as the biased radar would see it without noise.
+        calibration: what the recording's own ADS-B says of the radar.
+        results: filter's name to its tracks; the last with the calibration (`CALIBRATED`).
+        comparisons: each of them against the truth.
+        as_seen: each filter without it, against the truth as the biased radar would see it without
+            noise.
         straight: the same in straight flight only (downlinked roll below 2 degrees), the flight
             that a constant-velocity filter describes.
         plot_error: the same for plots before filtering.
@@ -58,6 +66,7 @@ class DemoResult:
 
     facts: dict[str, Any]
     recording: Recording
+    calibration: Calibration
     results: dict[str, TrackingResult]
     comparisons: list[Comparison]
     as_seen: list[Comparison]
@@ -68,7 +77,7 @@ class DemoResult:
 
 
 def run_demo(progress: Progress | None = None) -> DemoResult:
-    """Decode the shipped recording, track it with each filter, and hold that against the truth.
+    """Decode the shipped recording, calibrate, track with each filter, hold that to the truth.
 
     Args:
         progress: called with a few words before each stage.
@@ -79,25 +88,45 @@ def run_demo(progress: Progress | None = None) -> DemoResult:
     with as_file(_FOLDER / "recording.ast") as path:
         recording = read_recording(path)
     site = Site(**facts["site"])
+    say("calibrating against the recording's ADS-B")
+    adsb = references.from_recording(recording, "adsb")
+    calibration = calibrate(recording.plots, adsb, site, atmosphere=AIR)
     results, held = {}, []
     for name in FILTERS:
         say(f"tracking with {name}")
         results[name] = track(recording.plots, filter=lookup(name), site=site)
         ns = _ns_per_update(recording.plots, results[name], site)
         held.append(hold(results[name], truth, facts, ns))
-    false = false_tracks(results[name], truth, facts)
-    error = plot_error(results[name], truth, facts, false)
+    say(f"tracking with {CALIBRATED}")
+    results[CALIBRATED] = _calibrated(recording, calibration, site)
+    corrected = hold(results[CALIBRATED], truth, facts, float("nan")).true
+    false = false_tracks(results[FILTERS[-1]], truth, facts)
+    error = plot_error(results[FILTERS[-1]], truth, facts, false)
     true, seen, straight = (list(one) for one in zip(*held, strict=True))
+    corrected = replace(corrected, filter=CALIBRATED)
     return DemoResult(
         facts=facts,
         recording=recording,
+        calibration=calibration,
         results=results,
-        comparisons=true,
+        comparisons=[*true, corrected],
         as_seen=seen,
         straight=straight,
         plot_error=error,
         false_tracks=false,
-        remarks=_remarks(facts, held, error, len(false)),
+        remarks=_remarks(facts, held, corrected, error, len(false)),
+    )
+
+
+def _calibrated(recording: Recording, calibration: Calibration, site: Site) -> TrackingResult:
+    noise = calibration.noise
+    return track(
+        recording.plots,
+        filter=lookup(FILTERS[-1]),
+        site=site,
+        atmosphere=AIR,
+        errors=calibration.errors,
+        sensor_noise=(noise.range_m, noise.azimuth_deg),
     )
 
 
@@ -116,13 +145,21 @@ def shipped() -> tuple[dict[str, Any], Truth]:
     return facts, Truth(pl.read_parquet(io.BytesIO((_FOLDER / "truth.parquet").read_bytes())))
 
 
-def _remarks(facts: dict[str, Any], held: list[Held], error: PlotError, false: int) -> list[str]:
+def _remarks(
+    facts: dict[str, Any],
+    held: list[Held],
+    corrected: Comparison,
+    error: PlotError,
+    false: int,
+) -> list[str]:
     """Say what the figures mean."""
     radar = facts["radar"]
     biased = (
-        f"The radar's planted errors, {radar['range_bias_m']:+g} m in range, "
+        f"The radar's planted errors are {radar['range_bias_m']:+g} m in range, "
         f"{radar['azimuth_bias_deg']:+g} degrees in azimuth and {radar['time_bias_s']:+g} s in "
-        "time, are not removed: no calibration has been made."
+        f"time. {FILTERS[0]} and {FILTERS[-1]} track without a calibration; {CALIBRATED}, with "
+        f"what the recording's ADS-B says of them, is {corrected.position_rmse_m:.0f} m off the "
+        "truth."
     )
     plots = (
         f"Before any filter the plots are {error.as_measured:.0f} m off horizontally (root mean "
@@ -141,8 +178,8 @@ def _difference(held: Held) -> str:
     return (
         f"{true.filter}: {true.position_rmse_m:.0f} m and {true.velocity_rmse_mps:.1f} m/s off the "
         f"truth, {seen.position_rmse_m:.0f} m and {seen.velocity_rmse_mps:.1f} m/s off what this "
-        "radar would see without noise; the difference is bias, which tracking cannot remove. In "
-        f"straight flight the latter is {straight.position_rmse_m:.0f} m and "
+        "radar would see without noise; the difference is bias, which tracking alone cannot "
+        f"remove. In straight flight the latter is {straight.position_rmse_m:.0f} m and "
         f"{straight.velocity_rmse_mps:.1f} m/s, its ANEES {straight.anees:.2f}; a filter of "
         f"constant velocity cannot be consistent in turns ({seen.anees:.1f} over all flight)."
     )

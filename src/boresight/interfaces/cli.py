@@ -6,12 +6,12 @@ import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, TypeAlias
 
 from cyclopts import App, CycloptsError, Parameter
 
 from boresight.errors import BoresightError, UsageError
-from boresight.interfaces import door, jobs, pages, terminal
+from boresight.interfaces import calibrating, door, jobs, pages, terminal
 from boresight.interfaces.answers import Answer
 from boresight.interfaces.terminal import Manner
 
@@ -39,8 +39,11 @@ Site = Annotated[
     ),
 ]
 Air = Annotated[
-    Literal["none", "effective-earth", "exponential"],
-    Parameter(help="The air whose delay is taken out of the ranges."),
+    str | None,
+    Parameter(
+        show_default=lambda _: "none",
+        help="The air whose delay is taken out of the ranges: none, effective-earth, exponential.",
+    ),
 ]
 Filters = Annotated[
     list[str] | None,
@@ -79,7 +82,14 @@ def track(
         str | None, Parameter(help="Track this sensor's plots, SAC/SIC as inspect prints it.")
     ] = None,
     filter: Filters = None,  # noqa: A002 - the option is --filter
-    atmosphere: Air = "none",
+    calibration: Annotated[
+        Path | None,
+        Parameter(
+            help="A calibration.toml: plots are corrected by it, its noise is used, and what it "
+            "leaves uncertain is in the covariances."
+        ),
+    ] = None,
+    atmosphere: Air = None,
     strict: Strict = False,
     columns: Columns = None,
     output: Output | None = None,
@@ -91,7 +101,58 @@ def track(
         site=door.site(site) if site is not None else None,
         sensor=sensor,
         names=filter or [door.FILTER],
-        atmosphere=door.atmosphere(atmosphere),
+        calibration=calibration,
+        atmosphere=door.atmosphere(atmosphere) if atmosphere is not None else None,
+        strict=strict,
+        columns=_columns(columns),
+        folder=output,
+    )
+
+
+@app.command
+def calibrate(
+    file: File,
+    /,
+    *,
+    reference: Annotated[
+        str,
+        Parameter(
+            help="Where the targets were: a file (ASTERIX with CAT021 or CAT062, CSV, Parquet); "
+            "adsb or system-tracks of the recording itself; or downlink, the ground speed and "
+            "track that aircraft told the radar (Mode S)."
+        ),
+    ],
+    site: Site = None,
+    sensor: Annotated[
+        str | None, Parameter(help="Calibrate this sensor, SAC/SIC as inspect prints it.")
+    ] = None,
+    terms: Annotated[
+        str | None,
+        Parameter(
+            show_default=lambda _: "range,gain,azimuth,eccentricity,time",
+            help="What may be wrong, parted by commas; also elevation (estimated where it is "
+            "measured) and site.",
+        ),
+    ] = None,
+    atmosphere: Air = None,
+    gate: Annotated[
+        float | None,
+        Parameter(help="How far from its plot a target may be, m, where the radar hears no names."),
+    ] = None,
+    strict: Strict = False,
+    columns: Columns = None,
+    output: Output | None = None,
+) -> Job:
+    """Find what is wrong with a radar against GPS, ADS-B or system tracks."""
+    return partial(
+        calibrating.calibrate,
+        file,
+        reference=reference,
+        site=door.site(site) if site is not None else None,
+        sensor=sensor,
+        terms=door.terms(terms) if terms is not None else None,
+        atmosphere=door.atmosphere(atmosphere) if atmosphere is not None else None,
+        gate_m=gate,
         strict=strict,
         columns=_columns(columns),
         folder=output,
@@ -100,7 +161,7 @@ def track(
 
 @app.command
 def demo(*, output: Output = Path("boresight-demo")) -> Job:
-    """Track the built-in recording and compare it with its known truth."""
+    """Calibrate and track the built-in recording, against its known truth."""
     return partial(jobs.demo, output)
 
 

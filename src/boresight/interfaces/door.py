@@ -32,6 +32,20 @@ def site(text: str) -> "Site":
     return Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
 
 
+def place(given: "Site | tuple[float, float, float] | None") -> "Site | None":
+    """A site, or latitude, longitude (degrees) and height (m) as one.
+
+    Raises:
+        UsageError: no place on Earth.
+    """
+    from boresight.maths.frames import Site
+
+    if given is None or isinstance(given, Site):
+        return given
+    latitude, longitude, height = given
+    return Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
+
+
 def atmosphere(text: str) -> "Atmosphere | None":
     """The air of that name, None for none.
 

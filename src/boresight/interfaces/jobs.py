@@ -1,19 +1,18 @@
 """The commands' work: each calls the floors below and returns an answer; none of them prints."""
 
-import hashlib
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boresight.errors import DataError
-from boresight.interfaces import door, screens
+from boresight.interfaces import calibrating, door, screens, screens_calibration
 from boresight.interfaces.answers import Answer
+from boresight.interfaces.applying import applied
+from boresight.interfaces.reading import own_site
+from boresight.interfaces.recordings import no_plots, sensors, sha256
 from boresight.interfaces.terminal import Manner, progress
 
 if TYPE_CHECKING:
-    from boresight.formats.recording import Recording
     from boresight.interfaces.report import Report
     from boresight.maths.frames import Site
     from boresight.models.atmosphere import Atmosphere
@@ -47,6 +46,7 @@ def track(
     site: "Site | None",
     sensor: str | None,
     names: Sequence[str],
+    calibration: Path | None,
     atmosphere: "Atmosphere | None",
     strict: bool,
     columns: Mapping[str, str] | None,
@@ -64,17 +64,18 @@ def track(
     if read.plots.is_empty():
         raise no_plots(file, read.summary)
     source = door.sensor(sensor, sensors(read.summary)) if sensor else None
+    place = site or own_site(read, source)
+    using = applied(calibration, read.plots, site=place, sensor=source, atmosphere=atmosphere)
     with progress(f"Tracking with {first.name}", manner) as watch:
         result = track_plots(
             read.plots,
-            site=site or own_site(read, source),
-            sensor=source,
             filter=first,
             compare=others,
             leave_out=is_all,
-            atmosphere=atmosphere,
             progress=watch.count,
+            **using.arguments,
         )
+    result = replace(result, remarks=[*using.remarks, *result.remarks])
     outputs = []
     if target:
         about = read.summary | {"file": file.name, "sha256": sha256(file)}
@@ -86,42 +87,6 @@ def track(
         screen=lambda width: screens.tracked(result, outputs, width),
         remarks=[*read.summary.get("notes", ()), *result.remarks],
     )
-
-
-def no_plots(file: Path, summary: Mapping[str, Any]) -> DataError:
-    """The error of a recording that holds anything but a radar's plots."""
-    held = [f"CAT{row['category']:03d}" for row in summary["categories"] if row["category"]]
-    return DataError(
-        f"{file} holds no plots to track",
-        why=f"it holds {', '.join(held) or 'no records'}; plots are CAT048 or CAT010",
-        next_step=f"boresight inspect {shlex.quote(str(file))}",
-    )
-
-
-def own_site(read: "Recording", sensor: str | None) -> "Site | None":
-    """Where the tracked radar says it stands (CAT034, I034/120), if it does."""
-    import polars as pl
-
-    from boresight.maths.frames import Site
-
-    if read.sectors.is_empty():
-        return None
-    name = sensor or read.plots["sensor"].value_counts(sort=True)["sensor"][0]
-    mine = read.sectors.filter(pl.col("sensor") == name)
-    places = mine.select("latitude_deg", "longitude_deg", "height_m").drop_nulls()
-    return Site(**places.row(-1, named=True)) if places.height else None
-
-
-def sensors(summary: Mapping[str, Any]) -> list[str]:
-    """The sensors that a recording has plots of, as `inspect` names them."""
-    plots = [row for row in summary["categories"] if row["category"] in (None, 10, 48)]
-    return [row["sensor"] for row in plots]
-
-
-def sha256(file: Path) -> str:
-    """The SHA-256 of a file, in hexadecimal."""
-    with file.open("rb") as opened:
-        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def write(page: "Report", result: "TrackingResult", folder: Path) -> list[str]:
@@ -155,19 +120,19 @@ def tracking_content(result: "TrackingResult", outputs: Sequence[str]) -> dict[s
         "skipped": result.skipped.to_dicts(),
         "settings": result.settings,
         "remarks": result.remarks,
-        "targets": result.targets.to_dicts(),
+        "by_target": result.targets.to_dicts(),
     }
 
 
 def demo(folder: Path, manner: Manner) -> Answer:
-    """Track the recording in the package, compare with its truth, write report and tables."""
+    """Calibrate and track the recording in the package, compare with its truth, write it down."""
     from importlib.resources import as_file, files
 
     from boresight.experiments.demo import run_demo
     from boresight.interfaces.report import report
 
     target = door.folder(folder)
-    with progress("Tracking the built-in recording", manner) as watch:
+    with progress("The built-in recording", manner) as watch:
         found = run_demo(progress=watch.say)
     result = list(found.results.values())[-1]
     result = replace(result, remarks=[*found.remarks, *result.remarks])
@@ -179,10 +144,14 @@ def demo(folder: Path, manner: Manner) -> Answer:
         found.recording.summary | about,
         manner.command,
         as_seen=found.as_seen,
+        calibration=found.calibration,
     )
-    outputs = write(page, result, target)
+    outputs = [*write(page, result, target), *calibrating.keep(found.calibration, target)]
+    calibration = calibrating.content(found.calibration, outputs)
     content = tracking_content(result, outputs) | {
         "report": outputs[0],
+        "calibration": calibration,
+        **{name: calibration[name] for name in calibrating.REQUIRED},
         "comparisons": [asdict(each) for each in found.comparisons],
         "as_seen": [asdict(each) for each in found.as_seen],
         "plot_error": found.plot_error._asdict(),
@@ -195,6 +164,7 @@ def demo(folder: Path, manner: Manner) -> Answer:
             outputs,
             width,
             [
+                screens_calibration.planted(found.calibration, found.facts["radar"]),
                 screens.compared(AGAINST_TRUTH, found.comparisons),
                 screens.compared(AS_SEEN, found.as_seen),
             ],

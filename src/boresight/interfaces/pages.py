@@ -8,11 +8,12 @@ import os
 import sys
 from collections.abc import Sequence
 
-SUMMARY = "Track targets from radar recordings, and say how far the tracks can be trusted."
+SUMMARY = "Calibrate radars and track targets from recordings, and say how far to trust it."
 COMMANDS = {
     "inspect": "Say what a recording holds: format, sensors, times, damage.",
+    "calibrate": "Find what is wrong with a radar against GPS, ADS-B or system tracks.",
     "track": "Turn a recording into tracks, tables and a report.",
-    "demo": "Track the built-in recording and compare it with its known truth.",
+    "demo": "Calibrate and track the built-in recording, against its known truth.",
     "reproduce": "Repeat a paper's tables and claims, with a verdict for each.",
     "cite": "Print a filter's reference, and where the code differs from it.",
 }

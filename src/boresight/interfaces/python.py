@@ -15,6 +15,7 @@ from boresight.filters.smoother import smooth as smooth_lanes
 from boresight.filters.start import SPEED_MPS, two_plots
 from boresight.filters.stream import Stream
 from boresight.interfaces import door, given
+from boresight.interfaces.applying import applied
 from boresight.maths import Gaussian
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
@@ -25,6 +26,7 @@ from boresight.models.sensors import Radar, Sensor
 if TYPE_CHECKING:
     import polars as pl
 
+    from boresight.calibration.result import Calibration
     from boresight.interfaces.report import Report
     from boresight.tracking.result import TrackingResult
 
@@ -176,22 +178,6 @@ def stream(
     )
 
 
-def read(path: str | PathLike[str], *, strict: bool = False) -> "pl.DataFrame":
-    """Plots of a recording as a Polars frame.
-
-    Args:
-        path: ASTERIX (raw blocks, pcap and the framings recorders use), CSV or Parquet.
-        strict: stop at the first damaged block instead of skipping and counting it.
-
-    Raises:
-        MissingInputError: the file is not there or cannot be read.
-        DataError: the file is not what it should be; names the place.
-    """
-    from boresight.formats.recording import read_recording
-
-    return read_recording(Path(path), strict=strict).plots
-
-
 def inspect(path: str | PathLike[str]) -> dict[str, Any]:
     """What a recording holds: format, framing, categories with editions, sensors, damage."""
     from boresight.formats import recording
@@ -206,6 +192,7 @@ def track(
     sensor: str | None = None,
     filter: str = door.FILTER,  # noqa: A002 - the field's word
     compare: Sequence[str] | Literal["all"] = (),
+    calibration: "Calibration | None" = None,
     atmosphere: Atmosphere | None = None,
 ) -> "TrackingResult":
     """Tracks of every identified target of one radar.
@@ -217,31 +204,36 @@ def track(
         filter: of the catalogue.
         compare: further filters to run on the same plots with the same noise, or "all" that can
             take them; the result's `filters` and `scores`, and the report, set them side by side.
+        calibration: what `calibrate` found: plots are corrected by it, its noise is used, and what
+            it leaves uncertain is in the covariances (Schmidt).
         atmosphere: the air whose delay is taken out of the ranges, such as
-            `ExponentialAtmosphere()`; None for none.
+            `ExponentialAtmosphere()`; left out: that of the calibration, or none.
     """
     from boresight.tracking.tracker import track as track_plots
 
-    place = site
-    if place is not None and not isinstance(place, Site):
-        latitude, longitude, height = place
-        place = Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
     (first, *others), is_all = door.filters(
         [filter, *([compare] if isinstance(compare, str) else compare)]
     )
-    return track_plots(
-        plots,
-        site=place,
-        sensor=sensor,
-        filter=first,
-        compare=others,
-        leave_out=is_all,
-        atmosphere=atmosphere,
-    )
+    using = applied(calibration, plots, site=door.place(site), sensor=sensor, atmosphere=atmosphere)
+    result = track_plots(plots, filter=first, compare=others, leave_out=is_all, **using.arguments)
+    return replace(result, remarks=[*using.remarks, *result.remarks])
 
 
-def report(tracks: "TrackingResult", **about: Any) -> "Report":
-    """A report on one page: `.html`, `.save(path)`, and shown by itself in a notebook."""
+def report(
+    tracks: "TrackingResult | Calibration | None" = None,
+    calibration: "Calibration | None" = None,
+    **about: Any,
+) -> "Report":
+    """A report on one page: `.html`, `.save(path)`, and shown by itself in a notebook.
+
+    Args:
+        tracks: what `track` gives; or what `calibrate` gives, for a page about that alone.
+        calibration: what `calibrate` gives, for a page about both.
+        about: `inspection`, what `inspect` says of the file, and `command`, as the page shows them.
+    """
+    from boresight.calibration.result import Calibration
     from boresight.interfaces.report import report as build
 
-    return build(tracks, **about)
+    if isinstance(tracks, Calibration):
+        return build(calibration=tracks, **about)
+    return build(tracks, calibration=calibration, **about)

@@ -18,7 +18,7 @@ WORST = 8
 LONG = 4  # values of a list that are all shown
 
 
-def _table(heading: str, *heads: str, left: int = 1) -> "Table":
+def table(heading: str, *heads: str, left: int = 1) -> "Table":
     """A table whose first `left` columns are words and whose others are figures."""
     from rich import box
     from rich.table import Table
@@ -31,7 +31,8 @@ def _table(heading: str, *heads: str, left: int = 1) -> "Table":
     return table
 
 
-def _text(words: str, style: str = "") -> "RenderableType":
+def text(words: str, style: str = "") -> "RenderableType":
+    """Words in a style."""
     from rich.text import Text
 
     return Text(words, style=style)
@@ -42,10 +43,10 @@ def inspected(path: str, found: dict[str, Any]) -> "list[RenderableType]":
     skipped = found["skipped_bytes"]
     read = f"{figure(skipped)} bytes skipped" if skipped else "all of them read"
     head = f"{found['format']}, framing {found['framing']}, {figure(found['bytes'])} bytes, {read}"
-    table = _table("", "category", "edition", "sensor", "records", "first", "last", "scan", left=3)
+    grid = table("", "category", "edition", "sensor", "records", "first", "last", "scan", left=3)
     for row in found["categories"]:
         scan = row.get("scan_s")
-        table.add_row(
+        grid.add_row(
             category(row),
             row.get("edition") or "–",
             row.get("sensor") or "–",
@@ -54,9 +55,9 @@ def inspected(path: str, found: dict[str, Any]) -> "list[RenderableType]":
             clock(row.get("last_s")),
             f"{scan:.3f} s" if scan else "–",
         )
-    table.title = None
+    grid.title = None
     addresses = f"{figure(found['addresses'])} different 24-bit addresses"
-    return [_text(path, "bold"), _text(head), table, *_damage(found), _text(addresses)]
+    return [text(path, "bold"), text(head), grid, *_damage(found), text(addresses)]
 
 
 def _damage(found: dict[str, Any]) -> "list[RenderableType]":
@@ -69,7 +70,7 @@ def _damage(found: dict[str, Any]) -> "list[RenderableType]":
         f"category {each['category']} is not read: {figure(each['blocks'])} blocks"
         for each in found.get("unknown_categories", [])
     ]
-    return [_text(line, "yellow") for line in lines]
+    return [text(line, "yellow") for line in lines]
 
 
 def tracked(
@@ -84,25 +85,25 @@ def tracked(
         f"({percent(result.used, result.plots)}) in {figure(len(result.targets))} tracks, "
         f"filter {result.filter}; {figure(result.rejected)} outside their track's gate"
     )
-    parts = [_text(head, "bold"), _text(""), *truth, _nis(result)]
+    parts = [text(head, "bold"), text(""), *truth, _nis(result)]
     if len(result.filters) > 1:
         parts.append(_beside(result, width))
     parts.append(_worst(result, width))
     if not result.skipped.is_empty():
         parts.append(_skipped(result))
-    return [*parts, *_written(outputs)]
+    return [*parts, *written(outputs)]
 
 
 def _nis(result: "TrackingResult") -> "RenderableType":
     heading = "NIS per degree of freedom (1 is consistent)"
-    table = _table(heading, "", "mean", "median", "plots")
+    grid = table(heading, "", "mean", "median", "plots")
     for name, entry in result.nis.items():
         if not entry.get("scans"):
             continue
         words = NIS_WORDS.get(name, name.replace("_", " "))
         mean, median = (figure(entry.get(key), 3) for key in ("mean", "median"))
-        table.add_row(words, mean, median, f"{entry.get('scans', 0):,.0f}")
-    return table
+        grid.add_row(words, mean, median, f"{entry.get('scans', 0):,.0f}")
+    return grid
 
 
 def _beside(result: "TrackingResult", width: int) -> "RenderableType":
@@ -110,11 +111,11 @@ def _beside(result: "TrackingResult", width: int) -> "RenderableType":
     heading = f"Log-likelihood per plot minus that of {result.filter}, ± its 95 % interval"
     more = ["restarts", "speed 95 %"] if width >= WIDE else []
     heads = ["filter", "all flight", "straight", "NIS/dof", "rejected", *more, "ns"]
-    table = _table(heading, *heads)
+    grid = table(heading, *heads)
     for each in result.filters:
         speed = f"{figure(each.speed_error_95_mps, 3)} m/s" if each.speeds else "–"
         optional = [figure(each.restarts), speed]
-        table.add_row(
+        grid.add_row(
             each.filter,
             _gain(each.gain),
             _gain(each.gain_straight),
@@ -123,13 +124,13 @@ def _beside(result: "TrackingResult", width: int) -> "RenderableType":
             *(optional if more else []),
             figure(each.ns_per_update, 2),
         )
-    return table
+    return grid
 
 
 def _gain(value: "Gain") -> "RenderableType":
     """Green where the filter predicts better than the first, red where worse, at 95 %."""
     low, high = value.ci95
-    return _text(gain(value), "green" if low > 0 else "red" if high < 0 else "")
+    return text(gain(value), "green" if low > 0 else "red" if high < 0 else "")
 
 
 def _worst(result: "TrackingResult", width: int) -> "RenderableType":
@@ -137,11 +138,11 @@ def _worst(result: "TrackingResult", width: int) -> "RenderableType":
     more = ["from", "to", "restarts"] if width >= WIDE else []
     heading = f"The {len(shown)} worst of {len(result.targets):,} targets"
     heads = ["target", "verdict", *more[:2], "plots", "rejected", *more[2:], "NIS/dof"]
-    table = _table(heading, *heads, "95 % band", left=2)
+    grid = table(heading, *heads, "95 % band", left=2)
     for row in shown:
         optional = [clock(row["first_s"]), clock(row["last_s"]), figure(row["restarts"])]
         optional = optional if more else []
-        table.add_row(
+        grid.add_row(
             title(row),
             row["verdict"] or "–",
             *optional[:2],
@@ -151,28 +152,29 @@ def _worst(result: "TrackingResult", width: int) -> "RenderableType":
             figure(row["nis_per_dof"], 3),
             f"{figure(row['nis_low'], 3)} – {figure(row['nis_high'], 3)}",
         )
-    return table
+    return grid
 
 
 def _skipped(result: "TrackingResult") -> "RenderableType":
-    table = _table("Plots not used", "reason", "meaning", "plots", left=2)
-    table.columns[1].no_wrap = False
+    grid = table("Plots not used", "reason", "meaning", "plots", left=2)
+    grid.columns[1].no_wrap = False
     for row in result.skipped.to_dicts():
-        table.add_row(str(row["reason"]).replace("_", " "), row["meaning"], figure(row["count"]))
-    return table
+        grid.add_row(str(row["reason"]).replace("_", " "), row["meaning"], figure(row["count"]))
+    return grid
 
 
-def _written(outputs: Iterable[str]) -> "list[RenderableType]":
-    return [_text(f"wrote {path}", "green") for path in outputs]
+def written(outputs: Iterable[str]) -> "list[RenderableType]":
+    """The files that were written."""
+    return [text(f"wrote {path}", "green") for path in outputs]
 
 
 def compared(heading: str, comparisons: "Sequence[Comparison]") -> "RenderableType":
     """Filters against known truth."""
     heads = ("filter", "position", "velocity", "ANEES", "95 % band", "NIS/dof", "per update")
-    table = _table(heading, *heads)
+    grid = table(heading, *heads)
     for each in comparisons:
         low, high = each.anees_bounds
-        table.add_row(
+        grid.add_row(
             each.filter,
             f"{figure(each.position_rmse_m, 3)} m",
             f"{figure(each.velocity_rmse_mps, 3)} m/s",
@@ -181,7 +183,7 @@ def compared(heading: str, comparisons: "Sequence[Comparison]") -> "RenderableTy
             figure(each.nis_per_dof, 3),
             _duration(each.ns_per_update),
         )
-    return table
+    return grid
 
 
 def _duration(ns: float) -> str:
@@ -191,21 +193,21 @@ def _duration(ns: float) -> str:
 def reproduced(key: str, found: dict[str, Any]) -> "list[RenderableType]":
     """The screen of `boresight reproduce`."""
     claims = found["claims"]
-    table = _table(f"{key}: {len(claims)} claims", "claim", "published", "ours", "verdict", left=4)
-    for column in table.columns:
+    grid = table(f"{key}: {len(claims)} claims", "claim", "published", "ours", "verdict", left=4)
+    for column in grid.columns:
         column.no_wrap, column.overflow = False, "fold"
-    table.columns[0].no_wrap = True
+    grid.columns[0].no_wrap = True
     styles = {"reproduces": "green", "in band": "green", "does not reproduce": "red"}
     for each in claims:
-        verdict = _text(each["verdict"], styles.get(each["verdict"], "yellow"))
-        values = (_text(_lines(each[name])) for name in ("published", "ours"))
-        table.add_row(each["id"], *values, verdict)
+        verdict = text(each["verdict"], styles.get(each["verdict"], "yellow"))
+        values = (text(_lines(each[name])) for name in ("published", "ours"))
+        grid.add_row(each["id"], *values, verdict)
     counts = {each["verdict"]: 0 for each in claims}
     for each in claims:
         counts[each["verdict"]] += 1
     total = ", ".join(f"{number} {verdict}" for verdict, number in counts.items())
     more = "; --json adds bands, assumptions and the parts of each claim"
-    return [table, _text(f"{total}; seed {found['seed']}{more}")]
+    return [grid, text(f"{total}; seed {found['seed']}{more}")]
 
 
 def _lines(value: Any) -> str:
@@ -234,4 +236,4 @@ def cited(found: dict[str, Any]) -> "list[RenderableType]":
     from rich.text import Text
 
     bibtex = Text(found["bibtex"], no_wrap=True, overflow="ignore")
-    return [bibtex, *([_text(""), _text(differs)] if differs else [])]
+    return [bibtex, *([text(""), text(differs)] if differs else [])]

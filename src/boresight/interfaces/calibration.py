@@ -1,0 +1,152 @@
+"""The verb `calibrate`: a recording and a reference, whatever these are, make one calibration."""
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from boresight.errors import UsageError
+from boresight.interfaces import door, reading
+from boresight.maths.frames import Site
+from boresight.models.atmosphere import Atmosphere
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from boresight.calibration.references import Reference
+    from boresight.calibration.result import Calibration
+    from boresight.formats.recording import Recording
+
+DOWNLINK = "downlink"
+# What may be said instead of a file, and which reference of the recording it is.
+IN_THE_RECORDING = {"adsb": "adsb", "system-tracks": "system tracks"}
+
+
+def calibrate(
+    plots: "pl.DataFrame | str | PathLike[str]",
+    *,
+    reference: "str | PathLike[str] | pl.DataFrame",
+    site: Site | tuple[float, float, float] | None = None,
+    sensor: str | None = None,
+    terms: Sequence[str] | None = None,
+    atmosphere: Atmosphere | None = None,
+    gate_m: float | None = None,
+) -> "Calibration":
+    """Find what is wrong with a radar, and how sure that is.
+
+    Args:
+        plots: what `read` gives, or the recording's path.
+        reference: "adsb" or "system-tracks" of the recording itself; "downlink", what aircraft told
+            a Mode S radar of their motion; a file (ASTERIX with CAT021 or CAT062, CSV, Parquet); or
+            a frame with time_s, latitude_deg, longitude_deg, and address, mode_a or target.
+        site: of the radar: latitude and longitude in degrees, height above the ellipsoid in m.
+            Left out: what the recording says of it, if `plots` is a recording that does.
+        sensor: "SAC/SIC", if the plots are of several.
+        terms: what may be wrong: full names such as "range_bias_m", or "range", "gain", "azimuth",
+            "eccentricity", "time", "elevation", "site". Left out: all but the site.
+        atmosphere: the air whose delay is taken out of the ranges before; None for none.
+        gate_m: how far from its plot a target may be where the radar tells no identity.
+
+    Returns:
+        Estimates with intervals and joint covariance, noise, what cannot be told apart; see
+        `boresight.calibration.result.Calibration`. `track(..., calibration=...)` takes it.
+
+    Raises:
+        UsageError: no site is known, or "adsb" of a frame that is not as `read` gave it.
+        DataError: the reference has nothing in common with the plots.
+    """
+    read = reading.recording(plots)
+    if isinstance(reference, str) and reference in IN_THE_RECORDING and not read.summary:
+        raise UsageError(
+            f"a frame of plots holds no reference {reference!r}",
+            why="only the frame that read gave, as it gave it, knows the recording it came from",
+            next_step="give the recording's path instead of the frame, or the reference's own",
+        )
+    return calibrated(
+        read,
+        Path(reference) if isinstance(reference, PathLike) else reference,
+        site=door.place(site) or reading.own_site(read, sensor),
+        sensor=sensor,
+        terms=None if terms is None else door.terms(",".join(terms)),
+        atmosphere=atmosphere,
+        gate_m=gate_m,
+    )
+
+
+def calibrated(
+    read: "Recording",
+    reference: "str | Path | pl.DataFrame",
+    *,
+    site: Site | None,
+    sensor: str | None,
+    terms: tuple[str, ...] | None,
+    atmosphere: Atmosphere | None,
+    gate_m: float | None,
+) -> "Calibration":
+    """The calibration of one radar of a recording; arguments as `calibrate` has read them."""
+    from boresight.calibration.calibrate import calibrate as by_reference
+    from boresight.calibration.calibrate import calibrate_by_downlink
+
+    if site is None:
+        raise UsageError(
+            "where the radar stands is not known",
+            why="the recording does not say (CAT034, item 120)",
+            next_step="give the site: --site LAT,LON,H, or site=(latitude_deg, longitude_deg, "
+            "height_m)",
+        )
+    if isinstance(reference, str) and reference == DOWNLINK:
+        _refuse(terms, "terms", "it finds the azimuth bias")
+        _refuse(gate_m, "a gate", "nothing is paired")
+        return calibrate_by_downlink(read.plots, site, sensor=sensor, atmosphere=atmosphere)
+    return by_reference(
+        read.plots,
+        _reference(read, reference),
+        site,
+        sensor=sensor,
+        terms=terms,
+        atmosphere=atmosphere,
+        gate_m=gate_m,
+    )
+
+
+def _refuse(value: Any, what: str, why: str) -> None:
+    if value is not None:
+        raise UsageError(
+            f"{what} and the reference {DOWNLINK!r} do not go together",
+            why=why,
+            next_step=f"leave {what} out, or give another reference",
+        )
+
+
+def _reference(read: "Recording", given: "str | Path | pl.DataFrame") -> "Reference":
+    from boresight.calibration import references
+
+    if not isinstance(given, str | Path):
+        return references.from_table(given)
+    name = str(given)
+    if name in IN_THE_RECORDING:
+        return references.from_recording(read, IN_THE_RECORDING[name])
+    return references.from_file(name)
+
+
+def read_calibration(path: str | PathLike[str]) -> "Calibration":
+    """A calibration from its `calibration.toml`.
+
+    Raises:
+        MissingInputError: the file is not there or cannot be read.
+        DataError: it is no calibration.
+    """
+    from boresight.calibration.file import read_calibration as read_file
+
+    return read_file(Path(path))
+
+
+def write_calibration(calibration: "Calibration", path: str | PathLike[str]) -> Path:
+    """Write a calibration as TOML and return the path.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    from boresight.calibration.file import write_calibration as write_file
+
+    return write_file(calibration, Path(path))

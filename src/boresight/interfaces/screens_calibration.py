@@ -1,0 +1,91 @@
+"""What a person sees of a calibration in the terminal."""
+
+from collections.abc import Mapping, Sequence
+from math import floor, isfinite, isnan, log10
+from typing import TYPE_CHECKING, Any
+
+from boresight.interfaces.report.words import figure
+from boresight.interfaces.screens import table, text, written
+from boresight.models.systematic import TERMS
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from boresight.calibration.result import Calibration, TermFound
+
+CHANNELS = {"range_m": ("range", "m"), "azimuth_deg": ("azimuth", "°")}
+CHANNELS |= {"elevation_deg": ("elevation", "°"), "target_range_m": ("transponder delay", "m")}
+
+
+def calibrated(found: "Calibration", outputs: Sequence[str], width: int) -> "list[RenderableType]":
+    """The screen of `boresight calibrate`."""
+    del width
+    used = f"{figure(found.pairs)} pairs of {figure(found.targets)} targets"
+    sensor = f"Radar {found.sensor}" if found.sensor else "The radar"
+    parts = [text(f"{sensor} against {found.reference}: {used}", "bold"), text("")]
+    parts += [_terms(found), *(text(f"! {each.words}", "yellow") for each in found.directions)]
+    parts += [_noise(found)]
+    if any(found.dropped.values()):
+        parts.append(_dropped(found))
+    return [*parts, *written(outputs)]
+
+
+def _terms(found: "Calibration") -> "RenderableType":
+    grid = table("Systematic errors, measured minus true", "", "estimate", "sd", "95 % interval")
+    for name, term in found.terms.items():
+        grid.add_row(TERMS[name].words, *_figures(name, term))
+    if isfinite(found.air_gain_m_per_km):
+        gain = f"{found.air_gain_m_per_km:+.3f} m/km"
+        grid.add_row("gain that air alone would make", gain, "", "", style="dim")
+    return grid
+
+
+def planted(found: "Calibration", radar: Mapping[str, Any]) -> "RenderableType":
+    """What was found beside what was planted; terms that were not planted are zero."""
+    heading = "The calibration, against the errors that were planted"
+    grid = table(heading, "", "planted", "estimate", "sd", "95 % interval")
+    for name, term in found.terms.items():
+        digits = decimals(term.sd)
+        grid.add_row(
+            TERMS[name].words, f"{radar.get(name, 0.0):+.{digits}f}", *_figures(name, term)
+        )
+    return grid
+
+
+def _figures(name: str, term: "TermFound") -> "tuple[RenderableType, ...]":
+    unit, (low, high) = TERMS[name].unit, term.ci95
+    if not term.observable:
+        return text("not observable", "yellow"), text("–"), text("–")
+    digits = decimals(term.sd)
+    proven = low > 0 or high < 0
+    estimate = text(f"{term.estimate:+.{digits}f} {unit}", "bold" if proven else "")
+    interval = text(f"{low:+.{digits}f} to {high:+.{digits}f}")
+    return estimate, text(f"{term.sd:.{digits}f}"), interval
+
+
+def decimals(sd: float) -> int:
+    """Digits after the point that show two figures of a standard deviation."""
+    return max(0, 1 - floor(log10(sd))) if isfinite(sd) and sd > 0 else 3
+
+
+def _noise(found: "Calibration") -> "RenderableType":
+    grid = table("What is left: noise of single plots", "", "sd", "wide part", "its sd")
+    for name, (words, unit) in CHANNELS.items():
+        sd = getattr(found.noise, name)
+        if sd is None or isnan(sd):
+            continue
+        law = found.noise.laws.get(name)
+        wide = (f"{100 * law.tail_share:.0f} %", f"{figure(law.tail_sd, 2)} {unit}") if law else ()
+        grid.add_row(words, f"{figure(sd, 2)} {unit}", *(wide or ("", "")))
+    grid.add_row(
+        "pairs that are no measurement", f"{100 * found.noise.outlier_share:.1f} %", "", ""
+    )
+    return grid
+
+
+def _dropped(found: "Calibration") -> "RenderableType":
+    grid = table("Plots that were not used", "reason", "plots")
+    for reason, number in sorted(found.dropped.items(), key=lambda each: -each[1]):
+        if number:
+            grid.add_row(reason.replace("_", " "), figure(number))
+    return grid
