@@ -114,14 +114,14 @@ def calibration(frame=None, **changes):
         "atmosphere": "none",
         "air_gain_m_per_km": 0.18,
         "residuals": frame,
-        "tables": tables(frame),
+        "tables": tables(),
         "settings": {"gate_m": 1500.0, "robust": True},
         "remarks": ["12 reports of <b>one</b> aircraft came twice and were taken once."],
     }
     return Calibration(**fields | changes)
 
 
-def tables(frame):
+def tables():
     """Tables of noise, stability and detection, binned plainly."""
     rng = np.random.default_rng(2)
     edge, sector = np.arange(0, 200e3, 10e3), np.arange(0, 360, 10.0)
@@ -156,13 +156,13 @@ def tables(frame):
             }
         )
 
-    def seen(edges, width):
+    def seen(name, unit, edges):
         count = len(edges)
         share = np.resize(probability, count)
         return pl.DataFrame(
             {
-                "from": edges,
-                "to": edges + width,
+                f"{name}_from_{unit}": edges,
+                f"{name}_to_{unit}": edges + (edges[1] - edges[0]),
                 "due": np.full(count, 900),
                 "seen": np.round(900 * share).astype(int),
                 "probability": share,
@@ -170,6 +170,10 @@ def tables(frame):
                 "high": np.minimum(share + 0.02, 1.0),
             }
         )
+
+    def unexplained(name, unit, edges):
+        frame = seen(name, unit, edges).select(f"{name}_from_{unit}", f"{name}_to_{unit}")
+        return frame.with_columns(unidentified_per_scan=rng.gamma(2.0, 0.05, len(edges)))
 
     return {
         "noise_by_range": noise("range", "m", edge),
@@ -185,6 +189,8 @@ def tables(frame):
                 "high": [19.2, 0.063],
             }
         ),
-        "detection_by_range": seen(edge, 10e3),
-        "detection_by_azimuth": seen(sector, 10.0),
+        "detection_by_range": seen("range", "m", edge),
+        "detection_by_azimuth": seen("azimuth", "deg", sector),
+        "false_by_range": unexplained("range", "m", edge),
+        "false_by_azimuth": unexplained("azimuth", "deg", sector),
     }

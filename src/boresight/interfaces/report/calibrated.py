@@ -21,6 +21,8 @@ from boresight.models.systematic import TERMS
 if TYPE_CHECKING:
     from boresight.calibration.result import Calibration
 
+ROW_PX, ROOM_PX = 40, 100  # of the chart of terms: each row, and axis and legend
+NAMES = {"adsb": "ADS-B", "downlink": "tracks sent down", "table": "a table of positions"}
 TERMS_CAPTION = (
     "How far each error moves a plot. Dots: estimates. Whiskers: 95 % intervals, the errors of one "
     "target taken as alike. Thick and pale: how narrow they would look if all pairs were "
@@ -32,16 +34,22 @@ CORRELATION_CAPTION = (
 )
 KEY = """<ul class="key" aria-label="Key of the charts of residuals">
 <li><span class="swatch density"></span>pairs in the cell, few to many (logarithmic)</li>
-<li><span class="swatch mean"></span>median with its 95 % interval, clustered by target</li></ul>"""
+<li><span class="swatch mean"></span>median with its 95 % interval, clustered by target; none
+for fewer than three</li></ul>"""
+LAW_KEY = """<ul class="key" aria-label="Key of the charts of the law">
+<li><span class="swatch density"></span>residuals</li>
+<li><span class="swatch mean"></span>the fitted law</li>
+<li><span class="swatch part"></span>its narrow and its wide part</li>
+<li><span class="swatch spread"></span>a single normal law of the same middle</li>
+<li><span class="swatch band"></span>95 % of quantiles, if the law is true</li></ul>"""
 BEFORE_AFTER = (
     "<p>Measured minus reference, above as the radar gave it, below with the errors of the table "
     "taken out. A shape that is left below is an error that these terms do not have.{left_out}</p>"
 )
 LAW_WORDS = (
     "<p>What is left, against the law that was fitted to it: two normal laws of mean zero, one "
-    "narrow and one wide. In the quantile charts the law is the diagonal; the band would hold 95 % "
-    "of each quantile if it were true and plots were independent, which those of one target are "
-    "not.</p>"
+    "narrow and one wide. In the quantile charts the law is the diagonal. Their band takes plots "
+    "as independent, which those of one target are not.</p>"
 )
 STABLE_WORDS = (
     "<p>Mean errors that are left, by direction and over time, against the mean over all. Bars are "
@@ -105,7 +113,7 @@ def facts(calibration: "Calibration") -> dict[str, Any]:
 def _tiles(calibration: "Calibration") -> tuple[Tile, ...]:
     reference = escape(calibration.reference)
     return (
-        Tile("pairs", figure(calibration.pairs), f"against {reference}"),
+        Tile("pairs", figure(calibration.pairs), f"against {NAMES.get(reference, reference)}"),
         Tile("targets", figure(calibration.targets), "each one cluster of errors"),
         _tile(calibration, "azimuth_bias_deg"),
         _tile(calibration, "range_bias_m"),
@@ -132,9 +140,13 @@ def _captioned(drawn: Sequence[Panel], name: str, caption: str) -> str:
 
 
 def _bias(calibration: "Calibration", at: Typical, drawn: Sequence[Panel]) -> str:
-    return _captioned(drawn, "bias-terms", TERMS_CAPTION) + calibration_tables.terms(
-        calibration, at
+    rows = len(calibration.terms)
+    chart = "".join(
+        panel(each.name, TERMS_CAPTION, alt=each.alt, height_px=ROOM_PX + ROW_PX * rows)
+        for each in drawn
+        if each.name == "bias-terms"
     )
+    return chart + calibration_tables.terms(calibration, at)
 
 
 def _separable(calibration: "Calibration", drawn: Sequence[Panel]) -> str:
@@ -142,7 +154,7 @@ def _separable(calibration: "Calibration", drawn: Sequence[Panel]) -> str:
         return ""
     heat = _captioned(drawn, "bias-correlation", CORRELATION_CAPTION)
     said = calibration_tables.directions(calibration)
-    return f'<div class="halves"><div>{said}</div>{heat}</div>'
+    return f'{said}<div class="halves">{heat}</div>'
 
 
 def _residuals(calibration: "Calibration", drawn: Sequence[Panel]) -> str:
@@ -157,7 +169,7 @@ def _residuals(calibration: "Calibration", drawn: Sequence[Panel]) -> str:
 
 def _noise(drawn: Sequence[Panel]) -> str:
     laws, spread = _mine(drawn, "noise-"), _mine(drawn, "spread-")
-    words = f'{LAW_WORDS}<div class="quarters">{laws}</div>' if laws else ""
+    words = f'{LAW_WORDS}{LAW_KEY}<div class="quarters">{laws}</div>' if laws else ""
     return words + (f'<div class="quarters">{spread}</div>' if spread else "")
 
 

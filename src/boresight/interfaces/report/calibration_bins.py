@@ -61,7 +61,7 @@ _NOISE = (("noise_by_range", "range"), ("noise_by_azimuth", "azimuth"))
 _STABLE = (("sectors", "azimuth"), ("over_time", "time"))
 _COUNTS = (
     ("detection", "probability", ("low", "high"), "detection probability"),
-    ("false", "per_scan", (), "unexplained plots per scan"),
+    ("false", "unidentified_per_scan", (), "unidentified plots per scan"),
 )
 VIEWS = (
     *(_of_channel("spread", table, by, each, "sd") for each in CHANNELS for table, by in _NOISE),
@@ -71,7 +71,7 @@ VIEWS = (
         for table, by in _STABLE
     ),
     *(
-        View(f"{name}-{by}", f"{name}_by_{by}", _BY[by][0], ("from", "to"), value, error, words)
+        View(f"{name}-{by}", f"{name}_by_{by}", *_BY[by], value, error, words)
         for name, value, error, words in _COUNTS
         for by in ("range", "azimuth")
     ),

@@ -1,23 +1,31 @@
 """The systematic errors drawn: each with its interval on one scale, and how they go together."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from boresight.interfaces.report import charts
+from boresight.interfaces.report.calibration_findings import Finding, findings, systematic
 from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.charts import Chart
-from boresight.interfaces.report.residuals import Panel
+from boresight.interfaces.report.residuals import NORMAL_95, Panel
 from boresight.interfaces.report.words import decimals, interval, with_unit
 from boresight.models.systematic import TERMS
 
 if TYPE_CHECKING:
-    from boresight.calibration.result import Calibration, TermFound
+    from boresight.calibration.result import Calibration
 
+PALE = "rgba(91,102,117,0.35)"
 NOISE = "rgba(91,102,117,0.10)"
 SIGNS = [[0, "#0072B2"], [0.5, "#ffffff"], [1, "#D55E00"]]
-STRONG = 0.6  # of a correlation: white figures are read better on it
+COLORS = {
+    Finding.ERROR: charts.ORANGE,
+    Finding.NONE: charts.BLUE,
+    Finding.WITHIN: charts.PURPLE,
+    Finding.ENDLESS: charts.MUTED,
+}
+STRONG = 0.8  # of a correlation: white figures are read better on it
 
 
 def panels(calibration: "Calibration", typical: Typical) -> list[Panel]:
@@ -27,92 +35,101 @@ def panels(calibration: "Calibration", typical: Typical) -> list[Panel]:
 
 
 def _terms(calibration: "Calibration", typical: Typical) -> Panel:
-    seen = {name: each for name, each in calibration.terms.items() if each.observable}
-    names = list(calibration.terms)
-    scale = {name: typical.metres(name) for name in names}
-    place = {name: float(index) for index, name in enumerate(names)}
-    proven = {name: each for name, each in seen.items() if _is_proven(each)}
-    rest = {name: each for name, each in seen.items() if name not in proven}
+    found, names = findings(calibration), list(calibration.terms)
+    rows = [_row(n, calibration, typical.metres(n), float(i)) for i, n in enumerate(names)]
+    kinds = {kind: [row for row in rows if found[row.name] == kind] for kind in Finding}
+    bounded = kinds[Finding.ERROR] + kinds[Finding.NONE] + kinds[Finding.WITHIN]
     data = [
-        _naive(seen, scale, place),
-        _dots("error", proven, scale, place, charts.ORANGE),
-        _dots("none shows itself", rest, scale, place, charts.BLUE),
+        _bars([row for row in bounded if row.beyond], "with the systematic part", 3, _systematic),
+        _bars(bounded, "if all pairs were independent", 16, _naive),
+        *(_dots(kinds[kind], kind, color) for kind, color in COLORS.items() if kinds[kind]),
     ]
-    hidden = [name for name in names if name not in seen]
-    x = charts.axis(f"moves the plot of a target at {typical.words()} by, m", zeroline=True)
+    x = charts.axis(f"moves the plot of a target at {typical.words(*names)} by, m", zeroline=True)
     x |= {"zerolinecolor": charts.INK, "zerolinewidth": 1.4}
-    y = charts.axis("", tickvals=list(place.values()), showgrid=False)
-    y |= {"ticktext": [TERMS[name].words for name in names], "range": [len(names) - 0.4, -0.6]}
+    y = charts.axis("", tickvals=[row.place for row in rows], showgrid=False)
+    y |= {"ticktext": [row.label for row in rows], "range": [len(names) - 0.4, -0.6]}
     layout = charts.layout(xaxis=x, yaxis=y, showlegend=True)
-    layout["annotations"] = [_hidden(place[name]) for name in hidden]
+    layout["annotations"] = [_hidden(row.place) for row in kinds[Finding.UNSEEN]]
     layout["shapes"] = _noise_band(typical.noise_m(calibration.noise))
     alt = "each systematic error with its 95 % interval, as metres at a typical target"
-    return Panel("bias-terms", {"data": data, "layout": layout}, alt)
+    drawn = [trace for trace in data if trace]
+    return Panel("bias-terms", {"data": drawn, "layout": layout}, alt)
 
 
-def _is_proven(term: "TermFound") -> bool:
-    return term.ci95[0] > 0 or term.ci95[1] < 0
+class _Row(NamedTuple):
+    """One term as the chart needs it: figures in metres at a typical target, and words."""
+
+    name: str
+    place: float
+    middle: float
+    low: float
+    high: float
+    naive: float
+    beyond: float
+    label: str
+    said: str
 
 
-def _dots(
-    words: str,
-    terms: "Mapping[str, TermFound]",
-    scale: Mapping[str, float],
-    place: Mapping[str, float],
-    color: str,
-) -> Chart:
-    """Draw the estimates with their clustered intervals; the number itself is in the hover."""
-    unit = np.array([scale[name] for name in terms])
-    ends = np.array([each.ci95 for each in terms.values()]).reshape(-1, 2)
-    middle = np.array([each.estimate for each in terms.values()])
-    low, high = (np.where(np.isfinite(end), end, middle) for end in ends.T)
+def _row(name: str, calibration: "Calibration", scale: float, place: float) -> _Row:
+    term, kind = calibration.terms[name], TERMS[name]
+    places = decimals(term.sd)
+    estimate = with_unit(term.estimate, places, kind.unit)
+    low, high = (end * scale for end in term.ci95)
+    return _Row(
+        name=name,
+        place=place,
+        middle=term.estimate * scale,
+        low=low,
+        high=high,
+        naive=NORMAL_95 * term.independent_sd * scale,
+        beyond=systematic(name, calibration) * scale,
+        label=f"{kind.words}  <b>{estimate}</b>" if term.observable else kind.words,
+        said=f"{kind.words} {estimate} ({interval(term.ci95, places, kind.unit)})",
+    )
+
+
+def _dots(rows: "Sequence[_Row]", kind: Finding, color: str) -> Chart:
+    """Draw the estimates with their clustered intervals; the hover says the numbers."""
+    middle = np.array([row.middle for row in rows])
+    low, high = (np.array([getattr(row, end) for row in rows]) for end in ("low", "high"))
     return {
         "type": "scatter",
         "mode": "markers",
-        "name": words,
-        "x": charts.short(middle * unit, 22),
-        "y": charts.typed([place[name] for name in terms]),
+        "name": str(kind),
+        "x": charts.short(middle, 22),
+        "y": charts.typed([row.place for row in rows]),
         "error_x": {
             "symmetric": False,
-            "array": charts.short((high - middle) * unit, 22),
-            "arrayminus": charts.short((middle - low) * unit, 22),
+            "array": charts.short(np.where(np.isfinite(high), high - middle, np.nan), 22),
+            "arrayminus": charts.short(np.where(np.isfinite(low), middle - low, np.nan), 22),
             "color": color,
             "thickness": 1.8,
             "width": 5,
         },
-        "marker": {"size": 10, "color": color},
-        "hovertext": [_said(name, each) for name, each in terms.items()],
+        "marker": {"size": 8, "color": color},
+        "hovertext": [row.said for row in rows],
         "hovertemplate": "%{hovertext}<br>%{x:.3~g} m<extra></extra>",
     }
 
 
-def _said(name: str, term: "TermFound") -> str:
-    kind, places = TERMS[name], decimals(term.sd)
-    ends = interval(term.ci95, places, kind.unit)
-    return f"{kind.words} {with_unit(term.estimate, places, kind.unit)} ({ends})"
+def _naive(row: _Row) -> tuple[float, float]:
+    return row.middle - row.naive, row.middle + row.naive
 
 
-def _naive(
-    terms: "Mapping[str, TermFound]", scale: Mapping[str, float], place: Mapping[str, float]
+def _systematic(row: _Row) -> tuple[float, float]:
+    return row.low - row.beyond, row.high + row.beyond
+
+
+def _bars(
+    rows: "Sequence[_Row]", words: str, width: int, ends: "Callable[[_Row], tuple[float, float]]"
 ) -> Chart:
-    """Draw, thick and pale, how narrow the intervals would be if all pairs were independent."""
-    half = np.array([1.96 * each.independent_sd * scale[name] for name, each in terms.items()])
-    middle = np.array([each.estimate * scale[name] for name, each in terms.items()])
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "if all pairs were independent",
-        "x": charts.short(middle, 22),
-        "y": charts.typed([place[name] for name in terms]),
-        "error_x": {
-            "array": charts.short(np.nan_to_num(half), 22),
-            "color": "rgba(91,102,117,0.35)",
-            "thickness": 9,
-            "width": 0,
-        },
-        "marker": {"size": 1, "color": charts.MUTED},
-        "hoverinfo": "skip",
-    }
+    """Draw, pale, from one end to the other; nothing if there are no rows."""
+    if not rows:
+        return {}
+    x = np.array([(*ends(row), np.nan) for row in rows]).ravel()
+    y = charts.typed(np.repeat([row.place for row in rows], 3))
+    style = {"line": {"color": PALE, "width": width}, "name": words}
+    return charts.line(charts.short(x, 22), y, PALE, hoverinfo="skip") | style
 
 
 def _hidden(y: float) -> Chart:
@@ -129,6 +146,7 @@ def _noise_band(noise_m: float) -> list[Chart]:
 
 def _correlation(calibration: "Calibration") -> Panel:
     found = correlation(calibration)
+    blank = np.where(np.eye(len(found), dtype=bool), np.nan, found)
     words = [TERMS[name].words for name in calibration.errors.terms]
     square = charts.axis("", showgrid=False, ticks="")
     place = list(range(len(words)))
@@ -136,7 +154,7 @@ def _correlation(calibration: "Calibration") -> Panel:
     y = square | {"tickvals": place, "ticktext": words, "autorange": "reversed"}
     heat = {
         "type": "heatmap",
-        "z": charts.short(found),
+        "z": charts.short(blank),
         "zmin": -1,
         "zmax": 1,
         "colorscale": SIGNS,
@@ -164,8 +182,3 @@ def _figure(row: int, where: int, value: float) -> Chart:
     color = "#ffffff" if abs(value) > STRONG else charts.INK
     font = {"color": color, "size": 12}
     return {"text": f"{value:+.2f}", "x": where, "y": row, "showarrow": False, "font": font}
-
-
-def proven(terms: "Mapping[str, TermFound]") -> Sequence[str]:
-    """Name the terms that are observable and whose interval leaves zero out."""
-    return [name for name, each in terms.items() if each.observable and _is_proven(each)]

@@ -47,7 +47,6 @@ def _histogram(channel: Channel, values: Floats, law: "Law") -> Panel:
     centre, width = (bounds[1:] + bounds[:-1]) / 2, 2 * reach / BINS
     bars = {
         "type": "bar",
-        "name": "residuals",
         "x": charts.typed(centre),
         "y": charts.typed(np.where(counts > 0, counts, np.nan)),
         "width": width,
@@ -55,27 +54,22 @@ def _histogram(channel: Channel, values: Floats, law: "Law") -> Panel:
         "hovertemplate": "%{y:,.0f} pairs at %{x:.3~g}<extra></extra>",
     }
     number = len(values) * width
-    parts = [(1 - law.tail_share, law.sd, "narrow part"), (law.tail_share, law.tail_sd, "wide")]
-    curves = [number * share * _pdf(centre, one) for share, one, _ in parts]
-    data = [bars, _curve(centre, curves[0] + curves[1], charts.ORANGE, "fitted law", "solid")]
+    parts = [(1 - law.tail_share, law.sd), (law.tail_share, law.tail_sd)]
+    curves = [number * share * _pdf(centre, one) for share, one in parts]
+    data = [bars, _curve(centre, curves[0] + curves[1], charts.ORANGE, "solid")]
     if law.tail_share > 0:
-        data += [
-            _curve(centre, each, charts.PURPLE, words, dash)
-            for each, (_, _, words), dash in zip(curves, parts, ("dot", "dash"), strict=True)
-        ]
+        data += [_curve(centre, each, charts.PURPLE, "dash") for each in curves]
     top = np.log10(max(counts.max(), 2) * 2.0)
     y = charts.axis("pairs", type="log", range=[np.log10(0.6), top], dtick=1)
     x = charts.axis(f"{channel.words} residual after, {channel.unit}", range=[-reach, reach])
-    layout = charts.layout(xaxis=x, yaxis=y, showlegend=True, bargap=0)
+    layout = charts.layout(xaxis=x, yaxis=y, bargap=0)
     alt = f"histogram of {channel.words} residuals with the fitted law"
     return Panel(f"noise-law-{channel.stem}", {"data": data, "layout": layout}, alt)
 
 
-def _curve(x: Floats, y: Floats, color: str, words: str, dash: str) -> Chart:
+def _curve(x: Floats, y: Floats, color: str, dash: str) -> Chart:
     style = {"color": color, "width": 2 if dash == "solid" else 1.3, "dash": dash}
-    return charts.line(charts.typed(x), charts.short(y), color, name=words, hoverinfo="skip") | {
-        "line": style
-    }
+    return charts.line(charts.typed(x), charts.short(y), color, hoverinfo="skip") | {"line": style}
 
 
 def _pdf(x: Floats, sd: float) -> Floats:
@@ -99,29 +93,26 @@ def _quantiles(channel: Channel, values: Floats, law: "Law") -> Panel:
         packed,
         charts.short(robust_sd(values) * ndtri(share)),
         charts.MUTED,
-        name="a single normal law would lie here",
         hoverinfo="skip",
     ) | {"line": {"color": charts.MUTED, "width": 1.3, "dash": "dot"}}
     dots = {
         "type": "scatter",
         "mode": "markers",
-        "name": "residuals",
         "x": packed,
         "y": charts.short(values[rank], 16),
         "marker": {"size": 4.5, "color": charts.BLUE},
         "customdata": charts.typed(100 * share),
         "hovertemplate": "%{customdata:.2~f} % lie below %{y:.3~g}<extra></extra>",
     }
-    same = charts.line(packed, packed, charts.ORANGE, name="the fitted law", hoverinfo="skip")
+    same = charts.line(packed, packed, charts.ORANGE, hoverinfo="skip")
     data = [*charts.band(packed, charts.short(low, 16), charts.short(high, 16), "95 % band")]
     data += [normal, same, dots]
     unit = channel.unit
-    ends = [float(x[0]) * 1.05, float(x[-1]) * 1.05]
-    tall = [min(ends[0], float(values[rank[0]])), max(ends[1], float(values[rank[-1]]))]
+    ends = [1.05 * float(x[0]), 1.05 * float(x[-1])]
+    tall = [min(ends[0], 1.05 * float(values[0])), max(ends[1], 1.05 * float(values[-1]))]
     layout = charts.layout(
         xaxis=charts.axis(f"quantile of the fitted law, {unit}", range=ends),
         yaxis=charts.axis(f"{channel.words} residual after, {unit}", range=tall),
-        showlegend=True,
     )
     alt = f"quantiles of {channel.words} residuals over those of the fitted law"
     return Panel(f"noise-qq-{channel.stem}", {"data": data, "layout": layout}, alt)

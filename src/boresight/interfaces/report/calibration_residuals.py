@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 SEEN_AGAINST = (AGAINST[1], AGAINST[2], AGAINST[0], Against("height_m", "height, km", 40, 1e-3))
 BOTTOM_LEAST, GAP = 0.27, 0.05  # of the chart's height: the lower drawing, and between the two
 EXTREME = 0.003
+FEWEST_TARGETS = 3  # the interval of two is six times that of many
 
 
 class Channel(NamedTuple):
@@ -132,7 +133,7 @@ def _clustered(
     """Return the cells' medians, the residuals of one target taken as alike.
 
     The variance of a median is that of the signs about it: summed by target, they need no
-    independence within one. A cell that holds one target has no interval.
+    independence within one. A cell of fewer than three targets has no interval.
     """
     from scipy.special import stdtrit
 
@@ -143,7 +144,7 @@ def _clustered(
     sums = np.bincount(flat, sign, shape[0] * shape[1]).reshape(shape)
     held = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)
     clusters = np.count_nonzero(held, axis=1).astype(float)
-    dof = np.where(clusters > 1, clusters - 1, np.nan)
+    dof = np.where(clusters >= FEWEST_TARGETS, clusters - 1, np.nan)
     inflation = (sums**2).sum(axis=1) / np.maximum(found.number, 1) * clusters / dof
     return found._replace(error=found.error * np.sqrt(inflation) * stdtrit(dof, 0.975) / NORMAL_95)
 
@@ -161,7 +162,7 @@ def _layout(
     for mark, words, ends, domain in zip(
         ("yaxis", "yaxis2"), ("before", "after"), reach, domains, strict=True
     ):
-        title = f"{channel.words}, {channel.unit}" if words == "before" else words
+        title = f"{channel.words}, {channel.unit}" if words == "before" else ""
         layout[mark] = charts.axis(title, range=list(ends), domain=domain, nticks=6)
         layout[mark] |= {"zeroline": True, "zerolinecolor": charts.INK, "zerolinewidth": 1}
     layout["annotations"] = [

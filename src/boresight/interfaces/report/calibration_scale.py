@@ -21,9 +21,9 @@ class Typical(NamedTuple):
     range_m: float
     speed_mps: float
 
-    def words(self) -> str:
-        """Say where and how fast it is."""
-        speed = f" and {figure(self.speed_mps, 2)} m/s" if self.speed_mps > 0 else ""
+    def words(self, *terms: str) -> str:
+        """Say where it is and, if one of the terms asks for it, how fast."""
+        speed = f" and {figure(self.speed_mps, 2)} m/s" if "time_bias_s" in terms else ""
         return f"{figure(self.range_m / 1000, 2)} km{speed}"
 
     def metres(self, term: str) -> float:

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from boresight.interfaces.report.calibration_charts import proven
+from boresight.interfaces.report.calibration_findings import Finding, findings
 from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.words import (
     Cell,
@@ -30,35 +30,38 @@ NOTHING = Cell("–", is_figure=True)
 def terms(calibration: "Calibration", typical: Typical) -> str:
     """Every term; one that is not observable has no figure at all."""
     heads = ["error", "estimate", "95 % interval", "sd", "sd if independent"]
-    heads += [f"m at {typical.words()}", "finding"]
-    shown = proven(calibration.terms)
+    heads += ["moves a plot by", "finding"]
+    found = findings(calibration)
     rows = [
-        _term(name, each, each.estimate * typical.metres(name), is_proven=name in shown)
+        _term(name, each, typical.metres(name), found[name])
         for name, each in calibration.terms.items()
     ]
     marks = ["" if each.observable else ' class="unseen"' for each in calibration.terms.values()]
-    caption = "Systematic errors, measured minus true"
+    caption = (
+        "Systematic errors, measured minus true, and how far each moves the plot of a target at "
+    )
+    caption += typical.words(*calibration.terms)
     return table(caption, heads, rows, name="bias-table", row_attributes=marks)
 
 
-def _term(name: str, term: "TermFound", moved_m: float, *, is_proven: bool) -> list[Cell]:
+def _term(name: str, term: "TermFound", metres: float, finding: Finding) -> list[Cell]:
     kind, places = TERMS[name], decimals(term.sd)
-    if not term.observable:
-        return [text_cell(kind.words), *[NOTHING] * 5, Cell("not observable: no number to use")]
-    estimate = with_unit(term.estimate, places, kind.unit)
+    if finding is Finding.UNSEEN:
+        return [text_cell(kind.words), *[NOTHING] * 5, Cell(finding)]
+    estimate, is_error = with_unit(term.estimate, places, kind.unit), finding is Finding.ERROR
     cells = [
-        Cell(f"<b>{estimate}</b>" if is_proven else estimate, is_figure=True),
+        Cell(f"<b>{estimate}</b>" if is_error else estimate, is_figure=True),
         Cell(interval(term.ci95, places, kind.unit), is_figure=True),
         Cell(_sd(term.sd), is_figure=True),
         Cell(_sd(term.independent_sd), is_figure=True),
-        Cell(f"{moved_m:+z,.{max(decimals(abs(moved_m) / 10), 0)}f}", is_figure=True),
+        Cell(with_unit(term.estimate * metres, decimals(term.sd * metres), "m"), is_figure=True),
     ]
-    finding = "<b>error</b>" if is_proven else "none shows itself"
-    return [text_cell(kind.words), *cells, Cell(finding)]
+    said = f"<b>{finding}</b>" if is_error else str(finding)
+    return [text_cell(kind.words), *cells, Cell(said)]
 
 
 def _sd(value: float) -> str:
-    return f"{value:,.{decimals(value)}f}" if value < float("inf") else "–"
+    return figure(value, 2)
 
 
 def directions(calibration: "Calibration") -> str:
@@ -68,19 +71,19 @@ def directions(calibration: "Calibration") -> str:
     rows = [
         [
             Cell("hardly told" if each.observable else "<b>not told</b>"),
-            text_cell(each.words),
-            text_cell(", ".join(_weight(*one) for one in each.weights.items())),
             number_cell(each.correlation, 2),
+            Cell("<br>".join(_weight(*one) for one in each.weights.items())),
+            text_cell(each.words),
         ]
         for each in calibration.directions
     ]
-    heads = ["", "in words", "together these change nothing, or hardly", "correlation"]
+    heads = ["", "correlation", "together change hardly a plot", "in words"]
     return table("What these pairs cannot tell apart", heads, rows, name="direction-table")
 
 
 def _weight(name: str, weight: float) -> str:
     unit = TERMS[name].unit
-    value = ("+" if weight > 0 else "−") + figure(abs(weight), 2)
+    value = ("+" if weight > 0 else "-") + figure(abs(weight), 2)
     return f"{TERMS[name].words} {value}{'' if unit == '°' else ' '}{unit}"
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boresight.interfaces.report.calibration_charts import proven
+from boresight.interfaces.report.calibration_findings import Finding, findings, systematic
 from boresight.interfaces.report.calibration_residuals import inliers, measured
 from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.residuals import column
@@ -52,7 +52,9 @@ def sentences(
     parts = (
         _errors(calibration, typical),
         _eccentricity(calibration, typical),
+        _within(calibration),
         _none(calibration, typical),
+        _endless(calibration),
         _unseen(calibration),
         _directions(calibration),
         _systematic(calibration),
@@ -67,17 +69,16 @@ def sentences(
 
 
 def _errors(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
-    for name in proven(calibration.terms):
-        if name in ECCENTRICITY:
-            continue
+    shown = [name for name in _of(calibration, Finding.ERROR) if name not in ECCENTRICITY]
+    moves = {n: abs(calibration.terms[n].estimate) * typical.metres(n) for n in shown}
+    for name, moved in sorted(moves.items(), key=lambda item: -item[1]):
         term, kind = calibration.terms[name], TERMS[name]
-        moved = abs(term.estimate) * typical.metres(name)
         meaning = MEANING[name][term.estimate < 0]
         yield Sentence(
             "attention",
             f"<b>{kind.words.capitalize()} {_estimate(name, term)}</b> (95 % interval "
             f"{_interval(name, term)}): {meaning}. That is {figure(moved, 2)} m for a target at "
-            f"{typical.words()}.",
+            f"{typical.words(name)}.",
             "bias",
         )
 
@@ -92,7 +93,7 @@ def _interval(name: str, term: "TermFound") -> str:
 
 def _eccentricity(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
     """Say cosine and sine together, as what they are: a swing around the circle."""
-    shown = [name for name in proven(calibration.terms) if name in ECCENTRICITY]
+    shown = [name for name in _of(calibration, Finding.ERROR) if name in ECCENTRICITY]
     if not shown:
         return
     cosine, sine = (calibration.errors.value(name) for name in ECCENTRICITY)
@@ -111,38 +112,69 @@ def _eccentricity(calibration: "Calibration", typical: Typical) -> Iterator[Sent
     )
 
 
+def _within(calibration: "Calibration") -> Iterator[Sentence]:
+    terms = _of(calibration, Finding.WITHIN)
+    if terms:
+        yield Sentence(
+            "note",
+            f"{_listed(terms).capitalize()}: not zero, but no more than the systematic part beside "
+            "the interval, so it is not shown to be the radar's.",
+            "bias",
+        )
+
+
 def _none(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
     """Name the terms whose interval holds zero, and say how large they may still be."""
-    shown = proven(calibration.terms)
-    rest = {n: t for n, t in calibration.terms.items() if t.observable and n not in shown}
+    rest = _of(calibration, Finding.NONE)
     if not rest:
         return
     noise = typical.noise_m(calibration.noise)
-    largest = {n: max(map(abs, t.ci95)) * typical.metres(n) for n, t in rest.items()}
-    is_tight = max(largest.values()) <= noise if np.isfinite(noise) else False
-    said = "; ".join(
-        f"{TERMS[name].words} {_estimate(name, term)} ({_interval(name, term)})"
-        for name, term in rest.items()
-    )
+    largest = max(max(map(abs, t.ci95)) * typical.metres(n) for n, t in rest.items())
+    is_tight = largest <= noise
+    hidden = f"up to {figure(largest, 2)} m at {typical.words(*rest)}"
+    if is_tight:
+        hidden += ", less than the noise of one plot"
     yield Sentence(
         "good" if is_tight else "note",
-        f"No error shows itself in {said}: each interval holds zero. "
-        + (
-            "What they may still hide is less than the noise of one plot."
-            if is_tight
-            else f"They may still hide up to {figure(max(largest.values()), 2)} m at "
-            f"{typical.words()}."
-        ),
+        f"No error shows itself in {_listed(rest)}: each interval holds zero. They may still hide "
+        f"{hidden}.",
         "bias",
     )
 
 
-def _unseen(calibration: "Calibration") -> Iterator[Sentence]:
-    names = [TERMS[name].words for name, term in calibration.terms.items() if not term.observable]
-    if names:
+def _listed(terms: "dict[str, TermFound]") -> str:
+    return "; ".join(
+        f"{TERMS[name].words} {_estimate(name, term)} ({_interval(name, term)})"
+        for name, term in terms.items()
+    )
+
+
+def _of(calibration: "Calibration", kind: Finding) -> "dict[str, TermFound]":
+    found = findings(calibration)
+    return {name: each for name, each in calibration.terms.items() if found[name] is kind}
+
+
+def _endless(calibration: "Calibration") -> Iterator[Sentence]:
+    terms = _of(calibration, Finding.ENDLESS)
+    if terms:
         yield Sentence(
             "attention",
-            f"<b>Not observable here: {'; '.join(names)}.</b> Where these targets flew, the "
+            f"<b>No interval can be given for {_words(terms)}</b>: it takes several targets to see "
+            "how far their errors differ. How far off the estimates are is not known.",
+            "bias",
+        )
+
+
+def _words(terms: "dict[str, TermFound]") -> str:
+    return "; ".join(TERMS[name].words for name in terms)
+
+
+def _unseen(calibration: "Calibration") -> Iterator[Sentence]:
+    terms = _of(calibration, Finding.UNSEEN)
+    if terms:
+        yield Sentence(
+            "attention",
+            f"<b>Not observable here: {_words(terms)}.</b> Where these targets flew, the "
             "geometry does not tell it. There is no number to use, and a correction by this "
             "calibration holds only for targets seen in the same way.",
             "separable",
@@ -151,11 +183,12 @@ def _unseen(calibration: "Calibration") -> Iterator[Sentence]:
 
 def _directions(calibration: "Calibration") -> Iterator[Sentence]:
     for each in calibration.directions:
-        yield Sentence("note" if each.observable else "attention", escape(each.words), "separable")
+        words = escape(each.words[:1].upper() + each.words[1:])
+        yield Sentence("note" if each.observable else "attention", words, "separable")
 
 
 def _systematic(calibration: "Calibration") -> Iterator[Sentence]:
-    beyond = calibration.settings.get("azimuth_systematic_deg")
+    beyond = systematic("azimuth_bias_deg", calibration)
     if beyond:
         yield Sentence(
             "attention",

@@ -126,26 +126,28 @@ def _cell(cell: Cell) -> str:
     return f"<td{kind}{key}>{cell.html}</td>"
 
 
-def panel(name: str, caption: str, *, alt: str) -> str:
+def panel(name: str, caption: str, *, alt: str, height_px: int | None = None) -> str:
     """The empty place of a figure, with its caption and what it shows in words."""
+    style = f' style="height:{height_px}px"' if height_px else ""
     return (
-        f'<figure><div class="chart" id="{name}" role="img" aria-label="{escape(alt)}"></div>'
-        f"<figcaption>{caption}</figcaption></figure>"
+        f'<figure><div class="chart" id="{name}"{style} role="img" aria-label="{escape(alt)}">'
+        f"</div><figcaption>{caption}</figcaption></figure>"
     )
 
 
 def decimals(sd: float) -> int:
-    """Digits after the point that show two figures of a standard deviation."""
-    return min(max(1 - math.floor(math.log10(sd)), 0), 6) if math.isfinite(sd) and sd > 0 else 3
+    """Digits after the point that are worth showing: two of an sd up to 35, else one."""
+    known = math.isfinite(sd) and sd > 0
+    return min(max(math.ceil(-math.log10(sd / 3.5)), 0), 6) if known else 3
 
 
 def with_unit(value: float, places: int, unit: str) -> str:
-    """Render a signed number to so many places, its unit after it: `+0.535°`, `-2.70 m`."""
+    """Render a signed number to so many places, its unit after it: `+0.535°`, `-2.7 m`."""
     return f"{value:+z,.{places}f}" + (unit if unit == "°" else f" {unit}")
 
 
 def interval(ends: tuple[float, float], places: int, unit: str) -> str:
-    """Render an interval: `+0.515° to +0.555°`; in words where it has no ends."""
+    """Render an interval: `+0.515 to +0.555°`; in words where it has no ends."""
     if not all(map(math.isfinite, ends)):
         return "no interval: too few targets"
-    return f"{with_unit(ends[0], places, unit)} to {with_unit(ends[1], places, unit)}"
+    return f"{ends[0]:+z,.{places}f} to {with_unit(ends[1], places, unit)}"
