@@ -73,8 +73,9 @@ def step(
     applied = [_applied(case.model, channel) for channel in found]
     error, variance = (np.array(each) for each in zip(*applied, strict=True))
     plot, spread = pair.plot + error, np.diag(variance)
-    if not case.polar:  # a plot that has no place has no noise there: NaN
-        noise, spread = noise + 0.0 * sum(plot), spread + 0.0 * sum(plot)
+    if not case.polar:  # a plot that has no place has no noise there
+        gone, nothing = missing(sum(plot)), np.full(noise.shape, np.nan)
+        noise, spread = (_either(gone, nothing, each) for each in (noise, spread))
     kept = window | {
         "error": np.array([channel.post.mean for channel in found]),
         "cov": np.array([channel.post.cov.ravel() for channel in found]),
