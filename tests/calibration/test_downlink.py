@@ -36,13 +36,13 @@ def cut_to_zero(track_deg):
     return np.trunc(track_deg / STEP_DEG) * STEP_DEG
 
 
-def fly(rng, aircraft, seconds):
-    """Great circles with a turn of half a minute in two of three: (steps of 1 s, aircraft) each."""
+def fly(rng, aircraft, seconds, turn):
+    """Great circles, two of three with a turn of half a minute, rad/s: columns (s, aircraft)."""
     latitude = np.radians(SITE.latitude_deg + rng.uniform(-1.0, 1.0, aircraft))
     longitude = np.radians(SITE.longitude_deg + rng.uniform(-1.9, 1.9, aircraft))
     speed, height = rng.uniform(110, 250, aircraft), rng.uniform(2_000, 12_000, aircraft)
     track = rng.uniform(-np.pi, np.pi, aircraft)
-    rate = rng.choice([-0.03, 0.0, 0.03], aircraft)
+    rate = turn * rng.choice([-1, 0, 1], aircraft)
     begins = rng.uniform(0.2, 0.8, aircraft) * seconds
     rows = []
     for second in range(seconds):
@@ -75,13 +75,15 @@ def sky(
     seconds=600,
     noise=(20.0, 0.04),
     own_deg=0.03,
+    white_deg=0.02,
+    turn=0.03,
     wrong=0.0,
     spoil=None,
     keep=None,
 ):
-    """A recording: (table of plots); `own_deg` is the sd of each aircraft's own error of track."""
+    """A table of plots; `own_deg` is the sd of each aircraft's own error of track."""
     rng = np.random.default_rng(seed)
-    latitude, longitude, height, track, speed, turning = fly(rng, aircraft, seconds)
+    latitude, longitude, height, track, speed, turning = fly(rng, aircraft, seconds, turn)
     enu = enu_from_geodetic(latitude, longitude, height, SITE)
     distance, azimuth, _ = polar_from_enu(enu)
     shape = distance.shape
@@ -91,7 +93,7 @@ def sky(
     if keep is not None:
         seen &= keep(enu, track)
     heard = rng.random(shape) < 0.35
-    said = track + rng.normal(0, own_deg, aircraft) + rng.normal(0, 0.02, shape)
+    said = track + rng.normal(0, own_deg, aircraft) + rng.normal(0, white_deg, shape)
     said = encode((said + 180.0) % 360.0 - 180.0) % 360.0
     said_speed = np.round(speed / 1.03) * 1.03 + 0.0 * track
     mistaken = rng.random(shape) < wrong
@@ -135,6 +137,36 @@ def test_the_planted_bias_is_found(bias):
     assert found.sd < 0.02
     assert abs(found.estimate - bias) < SURE * found.sd
     assert found.ci95[0] < found.estimate < found.ci95[1]
+
+
+@pytest.mark.parametrize(
+    ("bias", "within"), [(0.25, 1e-4), (-4.0, 2e-4), (90.0, 3e-3), (180.0, 3e-3)]
+)
+def test_without_noise_the_answer_is_exact(bias, within):
+    silent = {
+        "turn": 0.0,
+        "noise": (0.0, 0.0),
+        "own_deg": 0.0,
+        "white_deg": 0.0,
+        "encode": np.array,
+    }
+    found = answer(sky(14, bias_deg=bias, **silent)).estimate
+    assert (found - bias + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=within)
+
+
+def test_a_turn_is_seen_in_the_tracks_where_no_roll_comes():
+    plots = sky(15, bias_deg=0.3).drop("roll_deg")
+    found = from_downlink(plots, SITE)
+    term = found.terms["azimuth_bias_deg"]
+    assert found.settings["stretches_failed"]["changing course"] >= 30  # two of three in 60 turn
+    assert abs(term.estimate - 0.3) < SURE * term.sd
+
+
+def test_no_stretch_spans_a_silence():
+    plots = sky(16, seconds=800)
+    parts = plots.filter(pl.col("time_s") < 330), plots.filter(pl.col("time_s") > 390)
+    together = from_downlink(pl.concat(parts), SITE)
+    assert together.pairs == sum(from_downlink(part, SITE).pairs for part in parts)
 
 
 def test_another_half_degree_moves_the_answer_by_half_a_degree():

@@ -55,9 +55,10 @@ def from_downlink(
     Returns:
         One term, `azimuth_bias_deg`. Its `residuals` have one row for each stretch of straight
         flight, not for each plot: row (of the plot in its middle), time_s, target (its address),
-        range_m, azimuth_deg and height_m (of its middle), azimuth_before_deg and azimuth_after_deg
-        (fitted minus downlinked direction, and that minus the bias), sd_deg (of a stretch), plots,
-        tracks (how many). `dropped` counts plots; with those used they make up the table.
+        range_m, azimuth_deg and height_m (of its middle, the bias taken out), azimuth_before_deg
+        and azimuth_after_deg (fitted minus downlinked direction, and that minus the bias), sd_deg
+        (of a stretch), plots, tracks (how many). `dropped` counts plots; with those used they make
+        up the table.
 
     Raises:
         DataError: no downlinked tracks, or too little straight flight with them.
@@ -69,11 +70,12 @@ def from_downlink(
             next_step="calibrate against another reference: adsb, or a file of positions",
         )
     reports, dropped = usable(plots, site, atmosphere)
-    found, lost = straight(reports, site)
+    rough, _, _ = _turned(reports, site, dropped)
+    # North at a target depends on where it is: all are placed anew with the bias taken out.
+    reports = reports.turned(-rough.value)
+    rest, found, lost = _turned(reports, site, dropped)
+    pooled = rest.beyond(rough.value)
     good = np.flatnonzero(found.reason == "")
-    if len(np.unique(found.target[good])) < FEWEST_AIRCRAFT:
-        raise _too_little(dropped, lost)
-    pooled = _pool(found, good)
     settings = _settings(reports, found, good, pooled, lost)
     lost_plots = {name: plots for name, (_, plots) in lost.items()}
     return Calibration(
@@ -95,6 +97,17 @@ def from_downlink(
         settings=settings,
         remarks=_remarks(settings),
     )
+
+
+def _turned(
+    reports: Reports, site: Site, dropped: dict[str, int]
+) -> tuple[Pooled, Stretches, dict[str, tuple[int, int]]]:
+    """By how much the radar turns straight flight, the stretches that say so, and what was lost."""
+    found, lost = straight(reports, site)
+    good = np.flatnonzero(found.reason == "")
+    if len(np.unique(found.target[good])) < FEWEST_AIRCRAFT:
+        raise _too_little(dropped, lost)
+    return _pool(found, good), found, lost
 
 
 def _pool(found: Stretches, some: Array) -> Pooled:

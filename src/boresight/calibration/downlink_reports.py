@@ -1,6 +1,6 @@
 """Plots of aircraft that give their address and height, with what they downlink of their motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,6 +45,13 @@ class Reports:
     speed_mps: Array
     roll_deg: Array
     scan_s: float
+
+    def turned(self, degrees: float) -> "Reports":
+        """The same with every azimuth greater by an angle."""
+        sin, cos = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+        east, north, up = self.enu.T
+        enu = np.stack([cos * east + sin * north, cos * north - sin * east, up], axis=-1)
+        return replace(self, enu=enu)
 
 
 def usable(

@@ -43,6 +43,10 @@ class Pooled(NamedTuple):
     wander: float
     weight: Array
 
+    def beyond(self, start: float) -> "Pooled":
+        """The same if all angles were counted from `start` (degrees) and not from zero."""
+        return self._replace(value=float(np.degrees(wrap(np.radians(start + self.value)))))
+
     def term(self) -> TermFound:
         """The mean as a systematic error is reported."""
         return TermFound(

@@ -171,16 +171,15 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _axes(centre: Array, velocity: Array, site: Site) -> tuple[Array, Array]:
-    """Unit vectors ahead and to the right of a motion, level where it is, in the radar's frame."""
-    east, north = _compass(centre, site)
-    e, n = _dot(velocity, east), _dot(velocity, north)
-    length = np.hypot(e, n)
-    e, n = (e / length)[:, None], (n / length)[:, None]
-    return e * east + n * north, n * east - e * north
+    """Unit vectors (s, 3) ahead and to the right of a motion, level where it is."""
+    up = np.cross(*_compass(centre, site))
+    aside = np.cross(velocity, up)
+    aside = aside / np.linalg.norm(aside, axis=-1, keepdims=True)
+    return np.cross(up, aside), aside
 
 
 def _compass(enu: Array, site: Site) -> tuple[Array, Array]:
-    """East and North (m, 3) of each place itself, in the radar's frame."""
+    """East and North (m, 3) at each place itself, in the radar's frame."""
     place = geodetic_from_ecef(ecef_from_enu(enu, site))
     latitude, longitude = np.radians(place.latitude_deg), np.radians(place.longitude_deg)
     cos, sin = np.cos(longitude), np.sin(longitude)
