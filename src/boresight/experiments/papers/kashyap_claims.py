@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from boresight.experiments.papers.kashyap_curves import blocks, noise
-from boresight.experiments.papers.kashyap_leak import outage, slower
+from boresight.experiments.papers.kashyap_leak import Ratio, outage, slower
 from boresight.experiments.papers.kashyap_study import Study
 from boresight.experiments.papers.kashyap_words import (
     LEAK,
@@ -20,10 +20,11 @@ from boresight.experiments.papers.kashyap_words import (
     said,
     share,
 )
-from boresight.experiments.verdicts import Claim, band_of, of_share, together
+from boresight.experiments.verdicts import Claim, Verdict, band_of, of_share, together
 
 Array = Any
 _FEW = 200  # runs beside the main question
+_OURS = "not a claim of the paper; the question is whether EMEKF is then better than no reference"
 
 
 def claims(study: Study) -> list[Claim]:
@@ -150,7 +151,6 @@ def _orders(study: Study) -> Claim:
 def _leak(study: Study) -> Claim:
     """KA-E1: errors below what the radar's plots alone allow, and what the reference does else."""
     second = study.leak["Set 2"]
-    below = [second[name].value + 3.0 * second[name].standard_error < 1.0 for name in study.pair]
     alone = second["emekf, R only"]
     return row(
         study,
@@ -161,16 +161,23 @@ def _leak(study: Study) -> Claim:
             for label, one in study.leak.items()
         }
         | {"a ratio below one": "the reference leaks into the estimate"},
-        verdict=said(not any(below)),
+        verdict=_leaks([second[name] for name in study.pair]),
         assumption="RMSE over the Cramer-Rao bound of the radar's plots alone, along each of "
         f"{study.runs} trajectories, scans 21 on, Set 2 first. No set has a bias to estimate. A "
         f"ratio below one means that the reference leaks into the estimate: EMEKF has "
-        f"{second['emekf'].value:.2f} ± {second['emekf'].standard_error:.2f} with a reference at "
-        f"every plot's own epoch, and {alone.value:.2f} ± {alone.standard_error:.2f} with R from "
+        f"{second['emekf'].value:.3f} ± {second['emekf'].standard_error:.3f} with a reference at "
+        f"every plot's own epoch, and {alone.value:.3f} ± {alone.standard_error:.3f} with R from "
         "the same window and nothing taken off. Where there is a reference as good and as timely "
         "as that, no radar is needed; where there is none, nothing is left of the gain",
         parts=_without_reference(study),
     )
+
+
+def _leaks(found: list[Ratio]) -> Verdict:
+    """Whether no error is below the bound, as far as three standard errors tell."""
+    if any(one.value + 3.0 * one.standard_error < 1.0 for one in found):
+        return "does not reproduce"
+    return "reproduces" if all(np.isfinite(one.standard_error) for one in found) else "in band"
 
 
 def _without_reference(study: Study) -> tuple[Claim, ...]:
@@ -185,26 +192,26 @@ def _without_reference(study: Study) -> tuple[Claim, ...]:
         part(
             "KA-E1",
             "correction by the prediction",
-            "the error model may run ahead of the reference",
+            None,
             late,
             said(max(late.values()) < 1.0),
-            "EMEKF's error over the bound when each plot is corrected by what earlier references "
-            "say: white noise cannot be predicted, so it is added",
+            f"{_OURS}: EMEKF's error over the bound when each plot is corrected by what earlier "
+            "references say. White noise cannot be predicted, so more of it is added",
         ),
         part(
             "KA-E1",
             f"no reference in scans {first} to {last}",
-            "there would be some outages",
+            None,
             gap,
             said(min(list(gap.values())[:2]) < gap[none]),
-            f"median position error there, m, of {few} runs; {reasons(study, 'outage_scans')}",
+            f"{_OURS}: median position error there, m, of {few} runs; {reasons(study, 'outage_scans')}",
         ),
         part(
             "KA-E1",
             "reference slower than the radar",
-            "GPS is available once a second, radar data at a much faster rate",
+            None,
             slow,
             said(list(slow.values())[1] < slow[none]),
-            f"RMSE, m, of {few} runs; {reasons(study, 'plots_per_reference')}",
+            f"{_OURS}: RMSE, m, of {few} runs; {reasons(study, 'plots_per_reference')}",
         ),
     )

@@ -73,28 +73,40 @@ def _one_run(
     figure, axes = sheet(rows, 2, title)
     seconds = study.worlds["Set 1"].time_s
     columns = {"time_s": seconds}
-    for place, (name, unit, scale), i in zip(axes.flat, _CHANNELS, range(3), strict=False):
-        for method in study.pair:
-            off, bound = (
-                scale * each[0, :, i] for each in (found[method].off, found[method].bounds)
-            )
-            place.plot(seconds, off, color=_INK[method], linewidth=1.0, label=method.upper())
-            for side in (bound, -bound):
-                place.plot(seconds, side, color=_INK[method], linewidth=0.8, linestyle=":")
-            label = f"{name} {method}, {unit.replace('°', 'deg')}"
-            columns |= {f"{label} error": off, f"{label} bound": bound}
-        place.set(
-            xlabel="time, s", ylabel=f"{name} error, {unit}", title=f"{name}; dotted: ±2σ claimed"
-        )
-        _finish(place)
+    pair = {method: found[method] for method in study.pair}
+    for i, (name, unit, scale) in enumerate(_CHANNELS):
+        lines = {
+            m: (scale * one.off[0, :, i], scale * one.bounds[0, :, i]) for m, one in pair.items()
+        }
+        columns |= _errors(axes.flat[i], seconds, lines, f"{name} error, {unit}")
     place = axes.flat[3]
-    for method in study.pair:
-        error = np.sqrt(found[method].square[0])
+    for method, one in pair.items():
+        error = np.sqrt(one.square[0])
         place.plot(seconds, error, color=_INK[method], linewidth=1.0, label=method.upper())
         columns[f"RSSPE {method}, m"] = error
     place.set(xlabel="time, s", ylabel="RSSPE, m", title="root sum square position error")
     _finish(place)
     return figure, columns
+
+
+def _errors(
+    place: Any, seconds: Array, lines: Mapping[str, tuple[Array, Array]], label: str
+) -> dict[str, Array]:
+    """Errors and, dotted, their bounds; the axis is that of the errors."""
+    columns: dict[str, Array] = {}
+    largest = 0.0
+    for method, (off, bound) in lines.items():
+        place.plot(seconds, off, color=_INK[method], linewidth=1.0, label=method.upper())
+        for side in (bound, -bound):
+            place.plot(seconds, side, color=_INK[method], linewidth=0.8, linestyle=":")
+        stem = f"{label.replace('°', 'deg')} {method}"
+        columns |= {stem: off, f"{stem}, bound": bound}
+        largest = max(largest, float(np.max(np.abs(off))))
+    limit = 1.6 * largest
+    place.set(xlabel="time, s", ylabel=label, ylim=(-limit, limit))
+    place.set_title(f"{label.split(maxsplit=1)[0]}, dotted: two standard deviations claimed")
+    _finish(place)
+    return columns
 
 
 def _finish(place: Any) -> None:
@@ -173,6 +185,9 @@ def _chart(study: Study) -> tuple[Any, dict[str, Array]]:
             )
             columns |= _bars(f"{table['where']} {method}", stated, values)
         place.set(yscale="log", ylabel="fit error, %", title=table["where"])
+        place.set_ylim(top=4.0 * place.get_ylim()[1])  # room for the legend
+        place.yaxis.set_major_formatter("{x:g}")
+        place.yaxis.set_minor_formatter("")
         place.set_xticks(np.arange(len(stated)), labels=list(stated))
         _finish(place)
         place.legend(fontsize="x-small", ncols=5)
@@ -194,7 +209,9 @@ def _bars(name: str, stated: Mapping[str, float], values: Array) -> dict[str, Ar
 
 def _blocks(study: Study) -> tuple[Any, dict[str, Array]]:
     """Figure 8: the first truth above; below, the difference, averaged over all truths."""
-    figure, axes = sheet(2, 3, "10 degrees: sequential and block processing, 25 noises a truth")
+    noises = study.assumed["noises_per_truth"]
+    title = f"10 degrees: sequential and block processing, {noises} noises of one truth"
+    figure, axes = sheet(2, 3, title)
     seconds = study.worlds["10 degrees"].time_s
     columns = {"time_s": seconds}
     for (above, below), (reading, found) in zip(axes.T, study.blocks.items(), strict=True):
@@ -211,7 +228,9 @@ def _blocks(study: Study) -> tuple[Any, dict[str, Array]]:
             columns[f"RSSPE {method}, {reading}, m"] = one.rsspe[0]
         gap = np.mean(found["sequential"].rsspe - found["block"].rsspe, axis=0)
         columns[f"sequential minus block, all truths, {reading}, m"] = gap
-        below.plot(seconds, gap, color="black", linewidth=1.0, label=f"{study.truths} truths")
+        below.plot(
+            seconds, gap, color="black", linewidth=1.0, label=f"mean of {study.truths} truths"
+        )
         below.axhline(0.0, color="gray", linewidth=0.8)
         above.set(ylabel="RSSPE, m", title=reading)
         below.set(xlabel="time, s", ylabel="sequential minus block, m")

@@ -91,13 +91,16 @@ def ratios(found: Runs, over: str, *methods: str) -> dict[str, Array]:
     }
 
 
-def of_table(published: Mapping[str, float], ours: Mapping[str, Array]) -> tuple[int, int, Verdict]:
-    """How many of a table's numbers are in their bands, how many must be, and the verdict."""
+def of_table(published: Mapping[str, float], ours: Mapping[str, Array]) -> tuple[str, Verdict]:
+    """How many of a table's numbers are in their bands, which are not, and the verdict."""
     bands = {name: band_of(ours[name]) for name in published}
-    inside = sum(low <= published[name] <= high for name, (low, high) in bands.items())
+    inside = {name: low <= published[name] <= high for name, (low, high) in bands.items()}
     each = [(ours[name] >= low) & (ours[name] <= high) for name, (low, high) in bands.items()]
     needed = int(np.quantile(np.sum(each, axis=0), 0.05, method="lower"))
-    return inside, needed, "in band" if inside >= needed else "does not reproduce"
+    count, outside = sum(inside.values()), [name for name, true in inside.items() if not true]
+    words = f"{count} of {len(inside)} numbers and ratios are inside; of our own runs 95 % have at "
+    words += f"least {needed}" + (f"; outside: {', '.join(outside)}" if outside else "")
+    return words, "in band" if count >= needed else "does not reproduce"
 
 
 def share(true: Array) -> tuple[float, Verdict]:
