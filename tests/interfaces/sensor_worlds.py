@@ -173,7 +173,10 @@ def tables():
 
     def unexplained(name, unit, edges):
         frame = seen(name, unit, edges).select(f"{name}_from_{unit}", f"{name}_to_{unit}")
-        return frame.with_columns(unidentified_per_scan=rng.gamma(2.0, 0.05, len(edges)))
+        plots = rng.integers(1, 60, len(edges))
+        return frame.with_columns(
+            paired=np.full(len(edges), 600), unidentified=plots, unidentified_per_scan=plots / 180
+        )
 
     return {
         "noise_by_range": noise("range", "m", edge),

@@ -13,6 +13,7 @@ from boresight.interfaces.report import (
 )
 from boresight.interfaces.report.calibration_scale import Typical, typical
 from boresight.interfaces.report.calibration_verdict import sentences
+from boresight.interfaces.report.calibration_words import NAMES, unit
 from boresight.interfaces.report.residuals import Panel
 from boresight.interfaces.report.sections import Block, Part, Tile, small
 from boresight.interfaces.report.words import decimals, figure, interval, panel, with_unit
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from boresight.calibration.result import Calibration
 
 ROW_PX, ROOM_PX = 40, 100  # of the chart of terms: each row, and axis and legend
-NAMES = {"adsb": "ADS-B", "downlink": "tracks sent down", "table": "a table of positions"}
 TERMS_CAPTION = (
     "How far each error moves a plot. Dots: estimates. Whiskers: 95 % intervals, the errors of one "
     "target taken as alike. Thick and pale: how narrow they would look if all pairs were "
@@ -56,9 +56,10 @@ STABLE_WORDS = (
     "95 % intervals clustered by target; among so many, one in twenty misses zero by chance.</p>"
 )
 DETECTION_WORDS = (
-    "<p>Detection probability counts a plot wherever the reference says a target was due. "
-    "Unexplained plots are those no target of the reference explains: false ones, and true ones of "
-    "targets that the reference does not carry.</p>"
+    "<p>A target of the reference in reach is due once a scan; detected, if a plot is paired with "
+    "it. Bars are 95 % intervals, the scans of one target taken as alike. Unidentified are plots "
+    "without an identity where the reference has no target: false ones, and true ones of targets "
+    "that it does not carry.</p>"
 )
 
 
@@ -77,7 +78,7 @@ def part(calibration: "Calibration", inspection: dict[str, Any]) -> Part:
         Block("before-after", "Residuals before and after", _residuals(calibration, drawn)),
         Block("noise", "Noise of one plot", _noise(drawn)),
         Block("stability", "Is it stable?", _stability(calibration, drawn)),
-        Block("detection", "Detection and unexplained plots", _detection(drawn)),
+        Block("detection", "Detection and false plots", _detection(calibration, drawn)),
         Block("pairs", "Pairs and reference", calibration_tables.dropped(calibration)),
     )
     return Part(
@@ -102,7 +103,7 @@ def facts(calibration: "Calibration") -> dict[str, Any]:
     plain = "pairs targets dropped reference sensor atmosphere air_gain_m_per_km settings remarks"
     return {name: getattr(calibration, name) for name in plain.split()} | {
         "terms": {name: asdict(each) for name, each in calibration.terms.items()},
-        "covariance": {"terms": calibration.errors.terms, "matrix": calibration.errors.cov},
+        "covariance": {"terms": calibration.errors.terms, "rows": calibration.errors.cov},
         "directions": [asdict(each) for each in calibration.directions],
         "noise": asdict(calibration.noise),
         "site": None if calibration.site is None else asdict(calibration.site),
@@ -111,9 +112,10 @@ def facts(calibration: "Calibration") -> dict[str, Any]:
 
 
 def _tiles(calibration: "Calibration") -> tuple[Tile, ...]:
-    reference = escape(calibration.reference)
+    reference = NAMES.get(calibration.reference, escape(calibration.reference))
+    sensor = f"radar {escape(calibration.sensor)} " if calibration.sensor else ""
     return (
-        Tile("pairs", figure(calibration.pairs), f"against {NAMES.get(reference, reference)}"),
+        Tile(unit(calibration), figure(calibration.pairs), f"{sensor}against {reference}"),
         Tile("targets", figure(calibration.targets), "each one cluster of errors"),
         _tile(calibration, "azimuth_bias_deg"),
         _tile(calibration, "range_bias_m"),
@@ -182,6 +184,7 @@ def _stability(calibration: "Calibration", drawn: Sequence[Panel]) -> str:
     return f'{STABLE_WORDS}<div class="quarters">{charts}</div>{changes}'
 
 
-def _detection(drawn: Sequence[Panel]) -> str:
+def _detection(calibration: "Calibration", drawn: Sequence[Panel]) -> str:
     charts = _mine(drawn, "detection-", "false-")
-    return f'{DETECTION_WORDS}<div class="quarters">{charts}</div>' if charts else ""
+    counts = calibration_tables.explained(calibration.tables.get("false_by_range"))
+    return f'{DETECTION_WORDS}<div class="quarters">{charts}</div>{counts}' if charts else ""

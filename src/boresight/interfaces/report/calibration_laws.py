@@ -1,13 +1,16 @@
-"""The law of the residuals that are left: histogram beside the fitted law, and quantiles."""
+"""The law of the residuals that are left: histogram beside the fitted law, and quantiles.
 
-from typing import TYPE_CHECKING
+Each pair counts by how likely it is a measurement of its target at all: of such the law speaks.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from boresight.interfaces.report import charts
-from boresight.interfaces.report.calibration_residuals import Channel, inliers, measured
+from boresight.interfaces.report.calibration_residuals import Channel, measured
 from boresight.interfaces.report.charts import Chart
-from boresight.interfaces.report.residuals import Floats, Panel, column, robust_sd
+from boresight.interfaces.report.residuals import Floats, Panel, column
 
 if TYPE_CHECKING:
     import polars as pl
@@ -15,35 +18,56 @@ if TYPE_CHECKING:
     from boresight.calibration.result import Calibration, Law
 
 BINS, WIDEST_SDS = 81, 12.0
-POINTS = 240  # of a quantile plot; half of them in the outer tenths
+SHOWN_TAIL = 0.005  # a wide part that holds less is not drawn apart
+POINTS, FARTHEST = 240, 3.9  # of a quantile plot; beyond so many sd lie 5 in 100,000
 GRID_SDS, GRID = 12.0, 8001
+
+
+class Left(NamedTuple):
+    """What is left, ascending (n,), and which share of the pairs lies below the middle of each."""
+
+    values: Floats
+    weights: Floats
+    share: Floats
+
+    def sd(self) -> float:
+        """Half the width of the middle 68.3 %."""
+        low, high = np.interp([0.158655, 0.841345], self.share, self.values)
+        return float(high - low) / 2
 
 
 def panels(calibration: "Calibration") -> list[Panel]:
     """Draw two charts for each channel that has a fitted law."""
-    kept, laws = inliers(calibration.residuals), calibration.noise.laws
+    frame, laws = calibration.residuals, calibration.noise.laws
     drawn = []
-    for channel in measured(kept):
+    for channel in measured(frame):
         law = laws.get(channel.name)
         if law is not None and law.sd > 0:
-            values = np.sort(left(kept, channel))
-            drawn += [_histogram(channel, values, law), _quantiles(channel, values, law)]
+            rest = left(frame, channel)
+            drawn += [_histogram(channel, rest, law), _quantiles(channel, rest, law)]
     return drawn
 
 
-def left(kept: "pl.DataFrame", channel: Channel) -> Floats:
+def left(frame: "pl.DataFrame", channel: Channel) -> Left:
     """Return the noise of single plots: residuals without what one target's plots share."""
-    values = column(kept, channel.columns[1])
-    if channel.stem == "range" and "delay_m" in kept.columns:
-        values = values - np.nan_to_num(column(kept, "delay_m"))
-    return values[np.isfinite(values)]
+    values = column(frame, channel.columns[1])
+    if channel.stem == "range" and "delay_m" in frame.columns:
+        values = values - np.nan_to_num(column(frame, "delay_m"))
+    weights = np.ones(len(values))
+    if "outlier" in frame.columns:
+        weights = 1.0 - np.nan_to_num(column(frame, "outlier"))
+    order = np.argsort(values)
+    order = order[np.isfinite(values[order]) & (weights[order] > 0)]
+    values, weights = values[order], weights[order]
+    return Left(values, weights, (np.cumsum(weights) - weights / 2) / max(weights.sum(), 1e-9))
 
 
-def _histogram(channel: Channel, values: Floats, law: "Law") -> Panel:
-    sd = robust_sd(values) or law.sd
-    reach = min(max(5 * sd, float(np.quantile(np.abs(values), 0.9995))), WIDEST_SDS * sd)
+def _histogram(channel: Channel, rest: Left, law: "Law") -> Panel:
+    sd = rest.sd() or law.sd
+    ends = np.abs(np.interp([0.00025, 0.99975], rest.share, rest.values))
+    reach = min(max(5 * sd, float(ends.max())), WIDEST_SDS * sd)
     bounds = np.linspace(-reach, reach, BINS + 1)
-    counts, _ = np.histogram(values, bounds)
+    counts, _ = np.histogram(rest.values, bounds, weights=rest.weights)
     centre, width = (bounds[1:] + bounds[:-1]) / 2, 2 * reach / BINS
     bars = {
         "type": "bar",
@@ -53,11 +77,11 @@ def _histogram(channel: Channel, values: Floats, law: "Law") -> Panel:
         "marker": {"color": "#9cc4e2", "line": {"width": 0}},
         "hovertemplate": "%{y:,.0f} pairs at %{x:.3~g}<extra></extra>",
     }
-    number = len(values) * width
+    number = float(rest.weights.sum()) * width
     parts = [(1 - law.tail_share, law.sd), (law.tail_share, law.tail_sd)]
     curves = [number * share * _pdf(centre, one) for share, one in parts]
     data = [bars, _curve(centre, curves[0] + curves[1], charts.ORANGE, "solid")]
-    if law.tail_share > 0:
+    if law.tail_share >= SHOWN_TAIL:
         data += [_curve(centre, each, charts.PURPLE, "dash") for each in curves]
     top = np.log10(max(counts.max(), 2) * 2.0)
     y = charts.axis("pairs", type="log", range=[np.log10(0.6), top], dtick=1)
@@ -68,38 +92,30 @@ def _histogram(channel: Channel, values: Floats, law: "Law") -> Panel:
 
 
 def _curve(x: Floats, y: Floats, color: str, dash: str) -> Chart:
-    style = {"color": color, "width": 2 if dash == "solid" else 1.3, "dash": dash}
-    return charts.line(charts.typed(x), charts.short(y), color, hoverinfo="skip") | {"line": style}
+    style = {"line": {"color": color, "width": 2 if dash == "solid" else 1.3, "dash": dash}}
+    return charts.line(charts.typed(x), charts.short(y), color, hoverinfo="skip") | style
 
 
 def _pdf(x: Floats, sd: float) -> Floats:
     return np.exp(-0.5 * (x / sd) ** 2) / (sd * np.sqrt(2 * np.pi)) if sd > 0 else 0.0 * x
 
 
-def _quantiles(channel: Channel, values: Floats, law: "Law") -> Panel:
+def _quantiles(channel: Channel, rest: Left, law: "Law") -> Panel:
     """Draw measured quantiles over the law's; the band holds 95 % of each if the law is true."""
-    from scipy.special import betaincinv, ndtri
+    from scipy.special import ndtri
 
-    number = len(values)
-    rank = _ranks(number)
-    share = (rank + 0.5) / number
+    share, y = _chosen(rest)
     x = _law_quantile(law, share)
-    low, high = (
-        _law_quantile(law, np.asarray(betaincinv(rank + 1.0, number - rank, end), dtype=float))
-        for end in (0.025, 0.975)
-    )
+    low, high = (_law_quantile(law, each) for each in _band(share, float(rest.weights.sum())))
     packed = charts.short(x, 16)
     normal = charts.line(
-        packed,
-        charts.short(robust_sd(values) * ndtri(share)),
-        charts.MUTED,
-        hoverinfo="skip",
-    ) | {"line": {"color": charts.MUTED, "width": 1.3, "dash": "dot"}}
+        packed, charts.short(rest.sd() * ndtri(share)), charts.INK, hoverinfo="skip"
+    ) | {"line": {"color": charts.INK, "width": 1.3, "dash": "dot"}}
     dots = {
         "type": "scatter",
         "mode": "markers",
         "x": packed,
-        "y": charts.short(values[rank], 16),
+        "y": charts.short(y, 16),
         "marker": {"size": 4.5, "color": charts.BLUE},
         "customdata": charts.typed(100 * share),
         "hovertemplate": "%{customdata:.2~f} % lie below %{y:.3~g}<extra></extra>",
@@ -107,25 +123,33 @@ def _quantiles(channel: Channel, values: Floats, law: "Law") -> Panel:
     same = charts.line(packed, packed, charts.ORANGE, hoverinfo="skip")
     data = [*charts.band(packed, charts.short(low, 16), charts.short(high, 16), "95 % band")]
     data += [normal, same, dots]
-    unit = channel.unit
     ends = [1.05 * float(x[0]), 1.05 * float(x[-1])]
-    tall = [min(ends[0], 1.05 * float(values[0])), max(ends[1], 1.05 * float(values[-1]))]
+    tall = [min(ends[0], 1.05 * float(y[0])), max(ends[1], 1.05 * float(y[-1]))]
     layout = charts.layout(
-        xaxis=charts.axis(f"quantile of the fitted law, {unit}", range=ends),
-        yaxis=charts.axis(f"{channel.words} residual after, {unit}", range=tall),
+        xaxis=charts.axis(f"quantile of the fitted law, {channel.unit}", range=ends),
+        yaxis=charts.axis(f"{channel.words} residual after, {channel.unit}", range=tall),
     )
     alt = f"quantiles of {channel.words} residuals over those of the fitted law"
     return Panel(f"noise-qq-{channel.stem}", {"data": data, "layout": layout}, alt)
 
 
-def _ranks(number: int) -> np.ndarray:
-    """Return the ranks to draw: evenly over the normal law's own axis, so tails get theirs."""
+def _chosen(rest: Left) -> tuple[Floats, Floats]:
+    """Return shares and quantiles to draw: even on the normal law's axis, so tails get theirs."""
     from scipy.special import ndtr
 
-    most = 3.9  # beyond it lie 5 in 100,000
-    share = ndtr(np.linspace(-most, most, POINTS))
-    edge = np.array([0, number - 1])
-    return np.unique(np.concatenate([edge, np.minimum((share * number).astype(int), number - 1)]))
+    wanted = ndtr(np.linspace(-FARTHEST, FARTHEST, POINTS))
+    last = len(rest.values) - 1
+    chosen = np.unique(np.clip(np.searchsorted(rest.share, wanted), 0, last))
+    chosen = np.unique(np.concatenate([[0], chosen, [last]]))
+    return rest.share[chosen], rest.values[chosen]
+
+
+def _band(share: Floats, number: float) -> list[Floats]:
+    """Return between which shares of the law 95 % of such quantiles lie: a beta distribution."""
+    from scipy.special import betaincinv
+
+    below, above = number * share + 0.5, number * (1 - share) + 0.5
+    return [np.asarray(betaincinv(below, above, end), dtype=float) for end in (0.025, 0.975)]
 
 
 def _law_quantile(law: "Law", share: Floats) -> Floats:

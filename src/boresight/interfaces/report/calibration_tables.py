@@ -126,6 +126,32 @@ def _change(value: float, row: dict[str, float], unit: str) -> list[Cell]:
     ]
 
 
+EXPLAINED = {
+    "paired": "paired with a target of the reference",
+    "unidentified": "no identity, and no target of the reference is there",
+    "near_target": "no identity, but a target of the reference is there",
+    "repeated": "one identity more than once in a scan: at least one is false",
+    "unreferenced": "an identity that the reference does not have then: seldom false",
+}
+
+
+def explained(frame: "pl.DataFrame | None") -> str:
+    """How many plots the reference explains, and what the others are."""
+    if frame is None or frame.is_empty():
+        return ""
+    counts = {name: int(frame[name].sum()) for name in EXPLAINED if name in frame.columns}
+    rows = [
+        [
+            text_cell(name.replace("_", " ")),
+            number_cell(each),
+            Cell(percent(each, sum(counts.values())), is_figure=True),
+            text_cell(EXPLAINED[name]),
+        ]
+        for name, each in counts.items()
+    ]
+    return table("Plots by what explains them", ["", "plots", "share", "meaning"], rows)
+
+
 def dropped(calibration: "Calibration") -> str:
     """Plots that made no pair, by reason, most first."""
     counts = {name: each for name, each in calibration.dropped.items() if each}

@@ -10,6 +10,7 @@ import numpy as np
 from boresight.interfaces.report.calibration_findings import Finding, findings, systematic
 from boresight.interfaces.report.calibration_residuals import inliers, measured
 from boresight.interfaces.report.calibration_scale import Typical
+from boresight.interfaces.report.calibration_words import MEANING, REFERENCES, unit
 from boresight.interfaces.report.residuals import column
 from boresight.interfaces.report.verdict import Sentence, damage
 from boresight.interfaces.report.words import decimals, figure, interval, with_unit
@@ -21,28 +22,6 @@ if TYPE_CHECKING:
 FEW_TARGETS = 20  # fewer, and intervals clustered by target are themselves rough
 UNALIKE = 1.5  # times the naive interval: worth a sentence
 ECCENTRICITY = ("azimuth_cos_deg", "azimuth_sin_deg")
-# What a positive and a negative error do, to a reader.
-MEANING = {
-    "range_bias_m": ("ranges are too long", "ranges are too short"),
-    "range_gain_m_per_km": ("ranges grow too fast", "ranges grow too slowly"),
-    "azimuth_bias_deg": ("azimuths are too far clockwise", "azimuths are too far anticlockwise"),
-    "time_bias_s": ("plots are stamped too late", "plots are stamped too early"),
-    "elevation_bias_deg": ("elevations are too high", "elevations are too low"),
-    "site_east_m": ("the antenna stands east of its stated place", "it stands west of it"),
-    "site_north_m": ("the antenna stands north of its stated place", "it stands south of it"),
-}
-REFERENCES = {
-    "adsb": "The reference is ADS-B: where aircraft say they are, mostly by satellite navigation. "
-    "An error common to all of them would be taken for the radar's.",
-    "system tracks": "The reference is a tracker's system tracks, and these are not the truth: "
-    "errors here are relative to them. If this radar feeds that tracker, the tracks carry some of "
-    "its errors, and what is found is less than what is wrong. A track also lags in turns.",
-    "table": "The reference is a table of positions; errors here are relative to it, and known "
-    "no better than it.",
-    "downlink": "There is no position reference: straight stretches of flight, as the radar sees "
-    "them, are held against the true track that the aircraft send down. That shows a rotation of "
-    "the whole picture, so the azimuth bias, and nothing of range or time.",
-}
 
 
 def sentences(
@@ -271,8 +250,8 @@ def _outliers(calibration: "Calibration") -> Iterator[Sentence]:
     if share > 0.0005:
         yield Sentence(
             "note" if share < 0.02 else "attention",
-            f"{100 * share:.2g} % of the pairs are no measurement of their target: a wrong "
-            "identity, place or time. They carry no weight.",
+            f"{100 * share:.2g} % of the {unit(calibration)} are no measurement of their target: "
+            "a wrong identity, place or time. They carry no weight.",
             "noise",
         )
     if math.isfinite(delay) and delay > 0:
@@ -288,12 +267,12 @@ def _sureness(calibration: "Calibration") -> Iterator[Sentence]:
     terms = [each for each in calibration.terms.values() if each.observable]
     ratios = [t.sd / t.independent_sd for t in terms if t.independent_sd > 0 and t.sd < math.inf]
     text = (
-        f"The intervals take the errors of one target as alike: {figure(calibration.pairs)} pairs "
-        f"count as {figure(calibration.targets)} targets."
+        f"The intervals take the errors of one target as alike: {figure(calibration.pairs)} "
+        f"{unit(calibration)} count as {figure(calibration.targets)} targets."
     )
     if ratios and max(ratios) > UNALIKE:
         text += (
-            f" Were all pairs taken as independent, they would be up to {figure(max(ratios), 2)} "
+            f" Were all taken as independent, they would be up to {figure(max(ratios), 2)} "
             "times narrower, and wrong."
         )
     is_few = calibration.targets < FEW_TARGETS

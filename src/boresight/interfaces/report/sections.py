@@ -80,6 +80,8 @@ def body(parts: Sequence[Part], inspection: dict[str, Any], provenance: dict[str
         Block("provenance", "Provenance", tables.pairs("What made this page", provenance)),
     )
     kept = [block for block in shown if block.html]
+    places = {each.name for part in parts for each in part.blocks if each.html}
+    places |= {each.name for each in kept}
     return "\n".join(
         [
             _header(parts[0], inspection),
@@ -89,7 +91,7 @@ def body(parts: Sequence[Part], inspection: dict[str, Any], provenance: dict[str
                 Block(
                     "verdict",
                     "Verdict",
-                    "".join(_verdict(part, is_alone=len(parts) == 1) for part in parts),
+                    "".join(_verdict(part, places, is_alone=len(parts) == 1) for part in parts),
                 )
             ),
             *map(_section, kept),
@@ -135,19 +137,20 @@ def _contents(kept: Sequence[Block]) -> str:
     return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
 
 
-def _verdict(part: Part, *, is_alone: bool) -> str:
-    items = "\n".join(map(_sentence, part.sentences))
+def _verdict(part: Part, places: set[str], *, is_alone: bool) -> str:
+    items = "\n".join(_sentence(each, places) for each in part.sentences)
     remarks = "".join(f"<li>{escape(each)}</li>" for each in part.remarks)
     head = "" if is_alone else f"<h3>{part.subject}</h3>"
     more = f"<h3>Remarks of the {part.kind}</h3><ul>{remarks}</ul>" if remarks else ""
     return f'{head}<ul class="verdict">{items}</ul>{more}'
 
 
-def _sentence(each: Sentence) -> str:
+def _sentence(each: Sentence, places: set[str]) -> str:
     glyph, words = MARKS[each.mark]
+    link = f' <a href="#{each.link}">Evidence</a>' if each.link in places else ""
     return (
         f'<li class="{each.mark}"><span class="mark" role="img" aria-label="{words}">{glyph}</span>'
-        f'<p>{each.html} <a href="#{each.link}">Evidence</a></p></li>'
+        f"<p>{each.html}{link}</p></li>"
     )
 
 
