@@ -7,6 +7,7 @@ import numpy as np
 
 from boresight.calibration.clusters import Sums
 from boresight.calibration.pairs import Pairs
+from boresight.calibration.robust import Setting, setting
 from boresight.models.systematic import SystematicErrors, effects
 
 Array = Any
@@ -19,25 +20,23 @@ class Columns(NamedTuple):
     """Residuals and effects.
 
     Attributes:
+        channels: their names.
         order: (m,) rows of the pairs.
         starts: (targets,) first row of each target that has any.
         target: (targets,) their numbers in the pairs.
         residual: (k, m) measured minus expected at the place of linearisation; 0 if not seen.
-        seen: (k, m) 1 where measured.
-        extra: (k, m) or (k, 1) variance that the reference adds.
-        lever: (k, m) metres for one unit of residual.
+        at: what the laws need to know.
         touch: for each channel the terms that touch it, (n_c,).
         effect: for each channel what one unit of them adds, (n_c, m).
         ranging: the channel that transponders delay; -1 if there is none.
     """
 
+    channels: tuple[str, ...]
     order: Array
     starts: Array
     target: Array
     residual: Array
-    seen: Array
-    extra: Array
-    lever: Array
+    at: Setting
     touch: tuple[Array, ...]
     effect: tuple[Array, ...]
     ranging: int
@@ -58,7 +57,7 @@ class Columns(NamedTuple):
             left[channel] -= terms[touch] @ effect
         if self.ranging >= 0:
             left[self.ranging] -= np.repeat(delay, self.counts)
-        return self.seen * left
+        return self.at.seen * left
 
     def sums(self, weight: Array, prior: Array) -> Sums:
         """Normal equations under weights (k, m) and prior inverse variances (n,)."""
@@ -93,18 +92,6 @@ class Columns(NamedTuple):
                 total[g][block] += weighted[:, a:b] @ effect[:, a:b].T
         return total
 
-    def some(self, step: int) -> "Columns":
-        """Every so-manieth pair, as one target: what a start is made from."""
-        return self._replace(
-            order=self.order[::step],
-            starts=self.starts[:1],
-            target=self.target[:1],
-            residual=self.residual[:, ::step],
-            seen=self.seen[:, ::step],
-            lever=self.lever[:, ::step],
-            effect=tuple(effect[:, ::step] for effect in self.effect),
-        )
-
 
 def columns(pairs: Pairs, terms: tuple[str, ...], moved: Array) -> Columns:
     """Arrange pairs, linearised where the moving ones of the terms (n,) put the targets."""
@@ -120,14 +107,16 @@ def columns(pairs: Pairs, terms: tuple[str, ...], moved: Array) -> Columns:
     seen = np.isfinite(residual)
     lever = _lever(placed)
     accuracy = np.nan_to_num(placed.accuracy_m)
+    extra = (accuracy / lever) ** 2 if accuracy.any() else np.zeros((len(lever), 1))
+    late = effects(MOVING[0], placed.position.T, placed.velocity.T)
+    second = np.array([late[channel] for channel in pairs.channels])
     return Columns(
+        channels=pairs.channels,
         order=order,
         starts=starts,
         target=target,
         residual=np.where(seen, residual, 0.0),
-        seen=seen.astype(float),
-        extra=(accuracy / lever) ** 2 if accuracy.any() else np.zeros((len(lever), 1)),
-        lever=lever,
+        at=setting(seen.astype(float), extra, lever, second),
         touch=touch,
         effect=effect,
         ranging=pairs.channels.index("range_m") if "range_m" in pairs.channels else -1,
@@ -165,3 +154,14 @@ def _lever(pairs: Pairs) -> Array:
         "elevation_rad": np.hypot(ground, pairs.position[:, 2]),
     }
     return np.maximum(np.array([lever[channel] for channel in pairs.channels]), _NEAR_M)
+
+
+def thinned(pairs: Pairs, most: int) -> Pairs:
+    """About `most` pairs of them, of every target its part."""
+    step = -(-len(pairs) // most)
+    if step == 1:
+        return pairs
+    order = np.argsort(pairs.target, kind="stable")
+    _, starts, counts = np.unique(pairs.target[order], return_index=True, return_counts=True)
+    rank = np.arange(len(pairs)) - np.repeat(starts, counts)
+    return pairs.take(order[rank % step == 0])

@@ -1,12 +1,12 @@
 """The fit of a registration: from a robust start to the most likely terms, delays and laws."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from boresight.calibration.clusters import Solved, delay_variance, solve
-from boresight.calibration.columns import MOVING, Columns, columns
+from boresight.calibration.columns import MOVING, Columns, columns, thinned
 from boresight.calibration.fixed_point import fixed_point
 from boresight.calibration.pairs import Pairs
 from boresight.calibration.robust import Classes, Errors, Laws, classify, first_laws, refit
@@ -77,7 +77,7 @@ class Fit:
     def robust_sd(self) -> Array:
         """(k,) of what is left, outliers aside."""
         real = self.classes.outlier < 0.5
-        return _spread(self.after[:, real], self.pairs.seen[:, real])
+        return _spread(self.after[:, real], self.pairs.at.seen[:, real])
 
     def scores(self) -> Array:
         """(targets, n) sums over each target's pairs of effect times influence."""
@@ -103,16 +103,20 @@ class Fit:
 
     def geometry(self) -> Array:
         """(targets, n, n) information of all pairs as if none were an outlier."""
-        variance = self.state.laws.total_sd[:, None] ** 2 + self.pairs.extra
-        return self.pairs.normals(self.pairs.seen / variance, len(self.prior))
+        variance = self.state.laws.variance + self.pairs.at.extra
+        return self.pairs.normals(self.pairs.at.seen / variance, len(self.prior))
 
 
 def fit(pairs: Pairs, terms: tuple[str, ...], *, robust: bool, delays: bool) -> Fit:
-    """Find the most likely terms; linearised twice if some of them move the targets."""
+    """Find the most likely terms.
+
+    First from some of the pairs, then from all, linearised where the first terms put the targets.
+    """
     prior = np.array([TERMS[term].scale for term in terms]) ** -2.0
-    data = columns(pairs, terms, np.zeros(len(terms)))
+    few = thinned(pairs, _START_PAIRS)
+    data = columns(few, terms, np.zeros(len(terms)))
     state, converged = _search(data, _start(data, prior, robust=robust), prior, delays=delays)
-    if any(term in MOVING for term in terms):
+    if few is not pairs or any(term in MOVING for term in terms):
         data = columns(pairs, terms, state.terms)
         state, converged = _search(data, state, prior, delays=delays)
     errors, after = _errors(data, state)
@@ -132,7 +136,7 @@ def _search(data: Columns, start: State, prior: Array, *, delays: bool) -> tuple
     random = delays and data.ranging >= 0 and len(data.starts) >= _FEWEST
     first, solved = _step(data, start, prior, random=random)
     sd = np.sqrt(np.diag(np.linalg.inv(solved.information)))
-    packing = Packing(sd, first.laws.sd[max(data.ranging, 0)], len(first.delay), len(first.laws.sd))
+    packing = Packing(sd, first.laws.sd[max(data.ranging, 0)], len(first.delay), first.laws)
 
     def step(vector: Array) -> Array:
         return packing.pack(_step(data, packing.unpack(vector), prior, random=random)[0])
@@ -164,22 +168,22 @@ def _errors(data: Columns, state: State) -> tuple[Errors, Array]:
     square = after**2
     if data.ranging >= 0:
         unsure = np.repeat(state.delay_error, data.counts)
-        square[data.ranging] += data.seen[data.ranging] * unsure
-    return Errors(square, data.seen, data.extra, data.lever), after
+        square[data.ranging] += data.at.seen[data.ranging] * unsure
+    return Errors(after, square, data.at), after
 
 
 def _start(data: Columns, prior: Array, *, robust: bool) -> State:
     """Least absolute residuals, all channels together in units of their own spread."""
-    some = data.some(-(-len(data.order) // _START_PAIRS))
+    seen = data.at.seen
     terms, none = np.zeros(len(prior)), np.zeros(len(data.starts))
     for _ in range(_START_STEPS):
-        left = some.after(terms, none[:1])
-        sd = _spread(left, some.seen)[:, None]
-        weight = some.seen / (sd * np.maximum(np.abs(left), _NEARLY * sd))
-        terms = solve(some.sums(weight, prior), 0.0).terms
-    sd = _spread(some.after(terms, none[:1]), some.seen)
+        left = data.after(terms, none)
+        sd = _spread(left, seen)[:, None]
+        weight = seen / (sd * np.maximum(np.abs(left), _NEARLY * sd))
+        terms = solve(data.sums(weight, prior), 0.0).terms
+    sd = _spread(data.after(terms, none), seen)
     variance = float(sd[data.ranging] ** 2) if data.ranging >= 0 else 0.0
-    return State(terms, none, none, variance, first_laws(sd, robust=robust))
+    return State(terms, none, none, variance, first_laws(data.channels, sd, robust=robust))
 
 
 def _spread(left: Array, seen: Array) -> Array:
@@ -195,13 +199,13 @@ class Packing(NamedTuple):
         terms: (n,) their standard deviations, about.
         delay: scale of delays, m.
         targets: number of delays.
-        channels: number of laws.
+        laws: whose numbers are sought.
     """
 
     terms: Array
     delay: float
     targets: int
-    channels: int
+    laws: Laws
 
     def pack(self, state: State) -> Array:
         """As a vector."""
@@ -214,25 +218,30 @@ class Packing(NamedTuple):
                 np.log(laws.sd),
                 laws.tail_share,
                 np.log(laws.tail_sd),
-                [laws.outlier_share, np.log(laws.outlier_m), state.delay_var / self.delay**2],
+                laws.wrong,
+                [np.log(laws.place_m), laws.late_s, np.log(laws.late_sd_s)],
+                [state.delay_var / self.delay**2],
             ]
         )
 
     def unpack(self, vector: Array) -> State:
         """From a vector, brought back into bounds."""
-        sizes = (len(self.terms), self.targets, self.targets, *(self.channels,) * 3)
+        sizes = (len(self.terms), self.targets, self.targets, *(len(self.laws.sd),) * 3)
         terms, delay, error, sd, share, wide, rest = np.split(vector, np.cumsum(sizes))
-        laws = Laws(
+        laws = replace(
+            self.laws,
             sd=np.exp(sd),
-            tail_share=np.clip(share, 0.0, 0.5),
+            tail_share=share,
             tail_sd=np.exp(wide),
-            outlier_share=float(np.clip(rest[0], 0.0, 0.5)),
-            outlier_m=float(np.exp(rest[1])),
-        )
+            wrong=rest[:2],
+            place_m=float(np.exp(rest[2])),
+            late_s=float(rest[3]),
+            late_sd_s=float(np.exp(rest[4])),
+        ).bounded()
         return State(
             terms * self.terms,
             delay * self.delay,
             np.maximum(error, 0.0) * self.delay**2,
-            float(max(rest[2], 0.0)) * self.delay**2,
+            float(max(rest[5], 0.0)) * self.delay**2,
             laws,
         )

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 Array = Any
-_MEMORY = 6
+_MEMORY = 10
 _GROWTH = 2.0  # of a step against the smallest so far: mixing has led astray
 _RANK = 1e-8  # of the largest singular value: differences below it are noise
 

@@ -127,7 +127,7 @@ def _noise(found: Fit, channels: tuple[str, ...]) -> NoiseFound:
     robust = found.robust_sd()
     by_door, single = {}, dict.fromkeys(("range_m", "azimuth_deg", "elevation_deg"))
     for i, channel in enumerate(channels):
-        if not found.errors.seen[i].any():
+        if not found.pairs.at.seen[i].any():
             continue
         door, unit = channel.replace("_rad", "_deg"), _DOOR[channel]
         by_door[door] = Law(

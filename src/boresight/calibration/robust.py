@@ -1,15 +1,16 @@
 """What errors of plots look like: two normal laws per channel, and pairs that are no measurement.
 
-Monopulse azimuths err by a narrow and a wide normal law. A wrong identity, place or time makes a
-pair that says nothing of its target; it shifts all channels together, by hundreds of metres or by
-hundreds of kilometres, so its displacement in metres has a Cauchy law in as many dimensions as
-there are channels. Class probabilities and laws are found by expectation-maximisation.
+Monopulse azimuths err by a narrow and a wide normal law. Two kinds of pairs say nothing of their
+target. A wrong identity or place shifts all channels together, by hundreds of metres or by hundreds
+of kilometres: its displacement has a Cauchy law in as many dimensions as there are channels. A
+wrong time shifts the target along its way, by so many seconds as a normal law says. Class
+probabilities and laws are found by expectation-maximisation.
 
     [peel2000] David Peel and Geoffrey J. McLachlan, "Robust mixture modelling using the t
         distribution"
 
 Differs from it: the normal classes are scale mixtures per channel; the wide one is held to a few
-times the narrow one, so that it cannot swallow what the Cauchy law is for.
+times the narrow one, so that it cannot swallow what the outliers' laws are for.
 """
 
 from dataclasses import dataclass, replace
@@ -19,14 +20,21 @@ import numpy as np
 
 Array = Any
 
-_WIDEST = 4.0  # wide law over narrow: beyond it an error is no noise but an outlier
+_WIDEST = {
+    "range_m": 2.0,
+    "azimuth_rad": 4.0,
+    "elevation_rad": 4.0,
+}  # over narrow; pulses time well
 _NEAREST = 1.5  # below it the two laws are one
-_USUAL = 3.0  # what the ratio is believed to be, worth this many plots:
-_WORTH = 5.0
-_OUTLIER_M = 1_000.0  # what the outliers' scale is believed to be, worth one of them
-_APART = 3.0  # outliers' scale over the noise of a place, at least
+_WORTH = 5.0  # plots that the belief in the widest law is worth
+_OUTLIER_M, _LATE_S = 1_000.0, 2.0  # believed scales of outliers, each worth one pair
+_LATEST_S = (1e-2, 1e4)  # bounds of its scale
+_BLUR = 1.0  # scale of a wrong time over the noise of a place, at least
+_APART = 3.0  # outliers' scales over the noise of a place, at least
 _SHARES = (1e-6, 0.5)  # of outliers, and of the wide law: more is not the rarer class any more
 _FINEST = 1e-9  # m or rad: a noise below it is none
+_LARGEST = 700.0  # whose exponential is still a number
+_SLOWEST = 1.0  # m/s: of a target at rest no wrong time shows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,139 +43,241 @@ class Laws:
 
     Attributes:
         sd: (k,) of the narrow law, m or rad.
+        widest: (k,) largest ratio of the wide law to the narrow one.
         tail_share: (k,) of the wide law; 0 makes the channel normal.
         tail_sd: (k,) of the wide law.
-        outlier_share: of pairs that are no measurement.
-        outlier_m: scale of the outliers' displacement.
+        wrong: (2,) shares of pairs at a wrong place and at a wrong time.
+        place_m: scale of the displacement at a wrong place.
+        late_s, late_sd_s: mean and standard deviation of a wrong time.
     """
 
     sd: Array
+    widest: Array
     tail_share: Array
     tail_sd: Array
-    outlier_share: float
-    outlier_m: float
+    wrong: Array
+    place_m: float = _OUTLIER_M
+    late_s: float = 0.0
+    late_sd_s: float = _LATE_S
 
     @property
     def robust(self) -> bool:
         """Whether there is any class but the narrow one."""
-        return self.outlier_share > 0.0
+        return bool(self.tail_share.any())
 
     @property
-    def total_sd(self) -> Array:
-        """(k,) of both laws together."""
+    def outlier_share(self) -> float:
+        """Of pairs that are no measurement of their target."""
+        return float(self.wrong.sum())
+
+    @property
+    def variance(self) -> Array:
+        """(k, 1) of both normal laws together."""
         share = self.tail_share
-        return np.sqrt((1.0 - share) * self.sd**2 + share * self.tail_sd**2)
+        return ((1.0 - share) * self.sd**2 + share * self.tail_sd**2)[:, None]
+
+    def bounded(self) -> "Laws":
+        """Brought back to where laws can be."""
+        if not self.robust:
+            return self
+        return replace(
+            self,
+            tail_share=np.clip(self.tail_share, *_SHARES),
+            tail_sd=np.clip(self.tail_sd, _NEAREST * self.sd, self.widest * self.sd),
+            wrong=np.clip(self.wrong, _SHARES[0], 0.5 * _SHARES[1]),
+            late_sd_s=float(np.clip(self.late_sd_s, *_LATEST_S)),
+        )
 
 
 class Classes(NamedTuple):
     """To which class the pairs belong, and what follows for the fit.
 
     Attributes:
-        outlier: (m,) probability that the pair is no measurement.
-        wide: (k, m) probability of the wide law, if it is one.
+        wrong: (2, m) probability of a wrong place and of a wrong time.
+        wide: (k, m) probability of the wide law, if the pair is a measurement.
         weight: (k, m) expected inverse variance; 0 where nothing was measured.
         curvature: (k, m) derivative of weight times residual, which is negative in the tails.
+        late_s, late_var: (m,) mean and variance of its wrong time, if it has one.
     """
 
-    outlier: Array
+    wrong: Array
     wide: Array
     weight: Array
     curvature: Array
+    late_s: Array
+    late_var: Array
+
+    @property
+    def outlier(self) -> Array:
+        """(m,) probability that the pair is no measurement."""
+        return self.wrong.sum(0)
+
+
+class Setting(NamedTuple):
+    """What the laws need to know of the pairs, the same in every step.
+
+    Attributes:
+        seen: (k, m) 1 where measured, else 0.
+        extra: (k, m) or (k, 1) variance that the reference adds.
+        lever: (k, m) metres of displacement for one unit of residual; 0 where not measured.
+        second: (k, m) what one second of wrong time adds; 0 where not measured.
+        count: (m,) channels measured.
+        base: (m,) log density of no displacement under a Cauchy law of scale 1 m, times
+            (2 pi)^(k/2).
+        typical_m: (k,) median lever.
+        speed_mps: typical displacement in one second.
+    """
+
+    seen: Array
+    extra: Array
+    lever: Array
+    second: Array
+    count: Array
+    base: Array
+    typical_m: Array
+    speed_mps: float
+
+
+def setting(seen: Array, extra: Array, lever: Array, second: Array) -> Setting:
+    """Gather what stays the same; `lever` and `second` (k, m) are needed where seen."""
+    from scipy.special import gammaln
+
+    count = seen.sum(0)
+    units = (seen * np.log(lever)).sum(0)
+    base = gammaln(0.5 * (1.0 + count)) - 0.5 * np.log(np.pi) + 0.5 * count * np.log(2.0) + units
+    lever, second = seen * lever, seen * second
+    speed = float(np.sqrt(np.median(((lever * second) ** 2).sum(0))))
+    return Setting(seen, extra, lever, second, count, base, np.median(lever, axis=1), speed)
 
 
 class Errors(NamedTuple):
     """What is known of the pairs' errors at some point of the fit.
 
     Attributes:
-        square: (k, m) expected squared residual, m² or rad²; 0 where nothing was measured.
-        seen: (k, m) 1 where measured, else 0.
-        extra: (k, m) or (k, 1) variance that the reference adds.
-        lever: (k, m) or (k, 1) metres of displacement for one unit of residual.
+        left: (k, m) residuals, m or rad; 0 where nothing was measured.
+        square: (k, m) their expected squares, what was taken out being uncertain.
+        at: the pairs.
     """
 
+    left: Array
     square: Array
-    seen: Array
-    extra: Array
-    lever: Array
+    at: Setting
 
 
-def first_laws(sd: Array, *, robust: bool) -> Laws:
+def first_laws(channels: tuple[str, ...], sd: Array, *, robust: bool) -> Laws:
     """Where the search for laws starts, from robust standard deviations (k,)."""
-    some = np.full(len(sd), 0.1 if robust else 0.0)
-    share = 0.05 if robust else 0.0
+    widest = np.array([_WIDEST[channel] for channel in channels])
     return Laws(
-        sd=sd, tail_share=some, tail_sd=_USUAL * sd, outlier_share=share, outlier_m=_OUTLIER_M
+        sd=sd,
+        widest=widest,
+        tail_share=np.full(len(sd), 0.1 if robust else 0.0),
+        tail_sd=widest * sd,
+        wrong=np.full(2, 0.03 if robust else 0.0),
     )
 
 
 def classify(errors: Errors, laws: Laws) -> Classes:
     """Probabilities of the classes given the errors, and the weights they give (E step)."""
-    narrow = 1.0 / (laws.sd[:, None] ** 2 + errors.extra)
+    square, at = errors.square, errors.at
+    narrow = 1.0 / (laws.sd[:, None] ** 2 + at.extra)
     if not laws.robust:
-        weight = errors.seen * narrow
+        weight = at.seen * narrow
         none = np.zeros_like(weight)
-        return Classes(none[0], none, weight, weight)
-    wide = 1.0 / (laws.tail_sd[:, None] ** 2 + errors.extra)
+        return Classes(np.zeros((2, len(at.count))), none, weight, weight, none[0], none[0])
+    wide = 1.0 / (laws.tail_sd[:, None] ** 2 + at.extra)
     share = laws.tail_share[:, None]
-    first = np.log1p(-share) + 0.5 * (np.log(narrow) - narrow * errors.square)
-    second = np.log(share) + 0.5 * (np.log(wide) - wide * errors.square)
-    odds = np.exp(np.minimum(second - first, 700.0))
-    inlier = (errors.seen * (first + np.log1p(odds) - 0.5 * np.log(2.0 * np.pi))).sum(0)
-    prior = np.log(laws.outlier_share) - np.log1p(-laws.outlier_share)
-    out = 1.0 / (1.0 + np.exp(np.minimum(inlier - _displaced(errors, laws) - prior, 700.0)))
-    belongs, tail = (1.0 - out) * errors.seen, odds / (1.0 + odds)
+    first = np.log1p(-share) + 0.5 * np.log(narrow) - 0.5 * narrow * square
+    second = np.log(share) + 0.5 * np.log(wide) - 0.5 * wide * square
+    odds = np.exp(np.minimum(second - first, _LARGEST))
+    inlier = (at.seen * (first + np.log1p(odds))).sum(0) + np.log1p(-laws.outlier_share)
+    late, late_s, late_var = _late(errors, laws)
+    density = np.stack([_displaced(errors, laws), late, inlier])
+    density[:2] += np.log(laws.wrong)[:, None]
+    chance = np.exp(density - density.max(0))
+    wrong, tail = chance[:2] / chance.sum(0), odds / (1.0 + odds)
+    belongs = (1.0 - wrong.sum(0)) * at.seen
     mean = belongs * ((1.0 - tail) * narrow + tail * wide)
     mean_square = belongs * ((1.0 - tail) * narrow**2 + tail * wide**2)
-    return Classes(out, tail, mean, mean - errors.square * (mean_square - mean**2))
+    curvature = mean - square * (mean_square - mean**2)
+    return Classes(wrong, tail, mean, curvature, late_s, late_var)
 
 
 def _displaced(errors: Errors, laws: Laws) -> Array:
-    """(m,) log density of the channels for an outlier: a Cauchy law in metres."""
-    from scipy.special import gammaln
-
-    count = errors.seen.sum(0)
-    half = 0.5 * (1.0 + count)
-    metres = (errors.seen * np.log(errors.lever)).sum(0) - count * np.log(laws.outlier_m)
-    return gammaln(half) - half * np.log(np.pi) + metres - half * np.log1p(_distance2(errors, laws))
+    """(m,) log density of a wrong place, times (2 pi)^(k/2)."""
+    at = errors.at
+    far = np.log1p(_distance2(errors, laws))
+    return at.base - at.count * np.log(laws.place_m) - 0.5 * (1.0 + at.count) * far
 
 
 def _distance2(errors: Errors, laws: Laws) -> Array:
     """(m,) squared displacement over the outliers' scale."""
-    return (errors.lever**2 * errors.square).sum(0) / laws.outlier_m**2
+    return (errors.at.lever**2 * errors.square).sum(0) / laws.place_m**2
+
+
+def _late(errors: Errors, laws: Laws) -> tuple[Array, Array, Array]:
+    """(m,) log density of a wrong time, times (2 pi)^(k/2); mean and variance of that time."""
+    at = errors.at
+    variance = laws.variance + at.extra
+    inverse = at.seen / variance
+    left = errors.left - laws.late_s * at.second
+    along = at.second * inverse
+    power, pull = (along * at.second).sum(0), (along * left).sum(0)
+    spread = 1.0 / (1.0 / laws.late_sd_s**2 + power)
+    distance = (left**2 * inverse).sum(0) - pull**2 * spread
+    room = (at.seen * np.log(variance)).sum(0) + np.log1p(laws.late_sd_s**2 * power)
+    return -0.5 * (room + distance), laws.late_s + spread * pull, spread
 
 
 def refit(errors: Errors, classes: Classes, laws: Laws) -> Laws:
     """The laws that suit the classes best (M step)."""
-    belongs = (1.0 - classes.outlier) * errors.seen
+    belongs = (1.0 - classes.outlier) * errors.at.seen
     far = belongs * classes.wide
     near = belongs - far
     sd2 = (near * _own(errors, laws.sd)).sum(1) / np.maximum(near.sum(1), 1.0)
     sd = np.maximum(np.sqrt(sd2), _FINEST)
     if not laws.robust:
-        return replace(laws, sd=sd, tail_sd=_USUAL * sd)
-    believed = _WORTH * (_USUAL * sd) ** 2
+        return replace(laws, sd=sd, tail_sd=laws.widest * sd)
+    believed = _WORTH * (laws.widest * sd) ** 2
     tail2 = ((far * _own(errors, laws.tail_sd)).sum(1) + believed) / (far.sum(1) + _WORTH)
-    return Laws(
+    late_s, late_sd_s = _lateness(errors, classes, laws)
+    return replace(
+        laws,
         sd=sd,
-        tail_sd=np.clip(np.sqrt(tail2), _NEAREST * sd, _WIDEST * sd),
-        tail_share=np.clip(far.sum(1) / np.maximum(belongs.sum(1), 1.0), *_SHARES),
-        outlier_share=float(np.clip(classes.outlier.mean(), *_SHARES)),
-        outlier_m=_outlier_scale(errors, classes, laws),
-    )
+        tail_sd=np.sqrt(tail2),
+        tail_share=far.sum(1) / np.maximum(belongs.sum(1), 1.0),
+        wrong=classes.wrong.mean(1),
+        place_m=_displacement(errors, classes, laws),
+        late_s=late_s,
+        late_sd_s=late_sd_s,
+    ).bounded()
 
 
 def _own(errors: Errors, sd: Array) -> Array:
     """(k, m) expected square of the plot's own error, the reference's taken off."""
-    share = sd[:, None] ** 2 / (sd[:, None] ** 2 + errors.extra)
-    return share * (share * errors.square + errors.extra)
+    share = sd[:, None] ** 2 / (sd[:, None] ** 2 + errors.at.extra)
+    return share * (share * errors.square + errors.at.extra)
 
 
-def _outlier_scale(errors: Errors, classes: Classes, laws: Laws) -> float:
+def _displacement(errors: Errors, classes: Classes, laws: Laws) -> float:
     """Scale of the Cauchy law, by its own expectation-maximisation [peel2000]."""
-    count = errors.seen.sum(0)
-    distance2 = _distance2(errors, laws)
-    pull = classes.outlier * (1.0 + count) / (1.0 + distance2)
-    found = (pull * distance2).sum() * laws.outlier_m**2 + _OUTLIER_M**2
-    place2 = (errors.lever**2 * errors.seen * laws.sd[:, None] ** 2).sum(0)
-    least = _APART * np.sqrt(np.median(place2))
-    return float(max(np.sqrt(found / ((classes.outlier * count).sum() + 1.0)), least))
+    count, wrong, distance2 = errors.at.count, classes.wrong[0], _distance2(errors, laws)
+    pull = (wrong * (1.0 + count) / (1.0 + distance2) * distance2).sum()
+    found = (pull * laws.place_m**2 + _OUTLIER_M**2) / ((wrong * count).sum() + 1.0)
+    return float(max(np.sqrt(found), _APART * _noise_m(errors, laws)))
+
+
+def _lateness(errors: Errors, classes: Classes, laws: Laws) -> tuple[float, float]:
+    """Mean and standard deviation of a wrong time."""
+    wrong = classes.wrong[1]
+    total = wrong.sum() + 1.0
+    late = (wrong * classes.late_s).sum() / total
+    spread = (classes.late_s - late) ** 2 + classes.late_var
+    square = (wrong * spread).sum() + _LATE_S**2 + late**2
+    least = _BLUR * _noise_m(errors, laws) / max(errors.at.speed_mps, _SLOWEST)
+    return float(late), float(max(np.sqrt(square / total), least))
+
+
+def _noise_m(errors: Errors, laws: Laws) -> float:
+    """Noise of a place in the channel that is finest there, m."""
+    metres = errors.at.typical_m * laws.sd
+    return float(metres[metres > 0.0].min(initial=_OUTLIER_M))
