@@ -54,7 +54,7 @@ def residuals(pairs=12_000, targets=40, seed=1):
             "range_after_m": range_after,
             "azimuth_before_deg": azimuth_after + azimuth_error,
             "azimuth_after_deg": azimuth_after,
-            "outlier": np.where(outlier, 0.98, 0.001),
+            "outlier": np.where(outlier, 1.0 - 1e-9, 0.001),
             "delay_m": delay,
         }
     )

@@ -124,7 +124,8 @@ def _quantiles(channel: Channel, rest: Left, law: "Law") -> Panel:
     data = [*charts.band(packed, charts.short(low, 16), charts.short(high, 16), "95 % band")]
     data += [normal, same, dots]
     ends = [1.05 * float(x[0]), 1.05 * float(x[-1])]
-    tall = [min(ends[0], 1.05 * float(y[0])), max(ends[1], 1.05 * float(y[-1]))]
+    tall = [float(np.clip(1.05 * y[0], 2 * ends[0], ends[0]))]
+    tall += [float(np.clip(1.05 * y[-1], ends[1], 2 * ends[1]))]
     layout = charts.layout(
         xaxis=charts.axis(f"quantile of the fitted law, {channel.unit}", range=ends),
         yaxis=charts.axis(f"{channel.words} residual after, {channel.unit}", range=tall),
@@ -141,6 +142,8 @@ def _chosen(rest: Left) -> tuple[Floats, Floats]:
     last = len(rest.values) - 1
     chosen = np.unique(np.clip(np.searchsorted(rest.share, wanted), 0, last))
     chosen = np.unique(np.concatenate([[0], chosen, [last]]))
+    least = 0.4 / rest.weights.sum()  # what lies farther out is less than half a measurement
+    chosen = chosen[np.abs(rest.share[chosen] - 0.5) <= 0.5 - least]
     return rest.share[chosen], rest.values[chosen]
 
 

@@ -210,8 +210,8 @@ def _what_is_left(calibration: "Calibration") -> Iterator[Sentence]:
     parts, worth = [], []
     for channel in measured(kept):
         before, after = (_rms(column(kept, name)) for name in channel.columns)
-        unit = channel.unit if channel.unit == "°" else f" {channel.unit}"
-        parts.append(f"{channel.words} {figure(before, 3)} to {figure(after, 3)}{unit}")
+        sign = channel.unit if channel.unit == "°" else f" {channel.unit}"
+        parts.append(f"{channel.words} {figure(before, 3)} to {figure(after, 3)}{sign}")
         worth.append(after / before if before else 1.0)
     if parts:
         yield Sentence(
@@ -228,7 +228,7 @@ def _rms(values: np.ndarray) -> float:
 
 def _noise(calibration: "Calibration") -> str:
     noise, said = calibration.noise, []
-    for words, value, unit, name in (
+    for words, value, sign, name in (
         ("range", noise.range_m, " m", "range_m"),
         ("azimuth", noise.azimuth_deg, "°", "azimuth_deg"),
         ("elevation", noise.elevation_deg, "°", "elevation_deg"),
@@ -237,11 +237,11 @@ def _noise(calibration: "Calibration") -> str:
             continue
         law = noise.laws.get(name)
         tail = (
-            f" ({100 * law.tail_share:.2g} % from a wider law of {figure(law.tail_sd, 2)}{unit})"
+            f" ({100 * law.tail_share:.2g} % from a wider law of {figure(law.tail_sd, 2)}{sign})"
             if law and law.tail_share >= 0.005
             else ""
         )
-        said.append(f"{words} {figure(value, 2)}{unit}{tail}")
+        said.append(f"{words} {figure(value, 2)}{sign}{tail}")
     return ", ".join(said)
 
 
