@@ -115,23 +115,23 @@ def fit(plots: "pl.DataFrame") -> Array:
     reason[(reason != "no position") & (column(plots, "range_m", np.nan) <= 0)] = "zero range"
     who = [n for n in ("address", "mode_a", "radar_track") if n in plots.columns]
     same = pl.struct("time_s", "range_m", "azimuth_deg", *who)
-    reason[~plots.select(same.is_first_distinct()).to_series().to_numpy()] = "repeated"
+    again = ~plots.select(same.is_first_distinct()).to_series().to_numpy()
+    reason[(reason == "") & again] = "repeated"
     return reason
 
 
 def has_identity(plots: "pl.DataFrame", reference: Reference) -> bool:
     """Whether plots and reference both tell addresses, or both Mode A codes."""
-    reason = fit(plots) == ""
 
     def told(name: str) -> bool:
-        return bool((column(plots, name, "")[reason] != "").any())
+        return name in plots.columns and bool(plots[name].count())
 
     return any(told(name) and reference.table[name].count() for name in ("address", "mode_a"))
 
 
 def _as_seen(paths: Paths, site: Site) -> Array:
     """(n,) complex: slant range of each report at its azimuth, north + i east, m."""
-    level = np.where(np.isnan(paths.height), paths.pressure, paths.height)
+    level: Array = np.where(np.isnan(paths.height), paths.pressure, paths.height)
     level = np.where(np.isnan(level), site.height_m, level)
     enu: Array = enu_from_geodetic(paths.latitude, paths.longitude, level, site)
     flat: Array = enu[:, 1] + 1j * enu[:, 0]

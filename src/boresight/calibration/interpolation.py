@@ -82,14 +82,14 @@ class Paths:
         last = max(len(keys) - 2, 0)
         at: Array = np.clip(found, 0, last)
         # The last report of a target stands for its own instant.
-        ends = (self.time[at] == time) & ~self._joined(at)
+        ends = (self.time[at] == time) & ~self.joined(at)
         at = np.clip(np.where(ends, at - 1, np.minimum(found, last)), 0, last)
         after = np.minimum(at + 1, len(keys) - 1)
         inside = (self.target[at] == target) & (self.time[at] <= time) & (time <= self.time[after])
-        return np.where(inside & self._joined(at), at, -1)
+        return np.where(inside & self.joined(at), at, -1)
 
-    def _joined(self, row: Array) -> Array:
-        """Whether a row and the next are of one target and close enough to be joined."""
+    def joined(self, row: Array) -> Array:
+        """(m,) whether a row and the next are of one target and close enough to be joined."""
         after = np.clip(row + 1, 0, len(self.time) - 1)
         row = np.clip(row, 0, len(self.time) - 1)
         gap = self.time[after] - self.time[row]
@@ -132,6 +132,12 @@ class Paths:
         slopes = _completed(slopes, chord)
         return _hermite(near, slopes, step[:, None], ((time - self.time[row]) / step)[:, None])
 
+    def line(self, row: Array, time: Array, height: Array, site: Site) -> Array:
+        """(m, 3) position as `at` gives it, on the straight line between two reports."""
+        share = ((time - self.time[row]) / (self.time[row + 1] - self.time[row]))[:, None]
+        first, last = self._place(row, height, site), self._place(row + 1, height, site)
+        return (1 - share) * first + share * last
+
     def _place(self, row: Array, height: Array, site: Site) -> Array:
         told = self.height[row]
         level = np.where(np.isnan(told), height, told)
@@ -152,7 +158,7 @@ class Paths:
 
         NaN where there is no report beyond that may be joined.
         """
-        joined = self._joined(np.minimum(row, other)) & (other >= 0) & (other < len(self.time))
+        joined = self.joined(np.minimum(row, other)) & (other >= 0) & (other < len(self.time))
         beyond = np.where(joined, other, row)
         span = np.abs(self.time[beyond] - self.time[row])
         span = np.where(joined, span, 1.0)[:, None]

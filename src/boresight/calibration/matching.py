@@ -4,13 +4,13 @@ Nothing is guessed: what could be of two targets, or of none for certain, is lef
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from boresight.calibration.interpolation import Paths
-from boresight.formats.usable import column
+from boresight.calibration.nearby import near
+from boresight.formats import usable
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,12 +23,7 @@ SHARE = 0.8
 _CLOSE_SCANS = 0.5  # two plots of one identity closer than this are of one scan
 _SHORTEST_S = 0.3  # no antenna turns faster
 
-MEANINGS = {
-    "coasted": "the radar's own prediction, not a measurement",
-    "no position": "range or azimuth is missing",
-    "test": "a test target or a simulated one",
-    "no identity": "neither a 24-bit address nor a Mode A code",
-    "garbled code": "the Mode A code is marked garbled or not validated, and there is no address",
+MEANINGS = usable.MEANINGS | {
     "no time": "the time is missing",
     "zero range": "the range is zero or less",
     "repeated": "the same plot again: identity, time, range and azimuth",
@@ -75,10 +70,11 @@ def by_identity(
     import polars as pl
 
     address, code = pl.lit("#") + pl.col("address"), pl.lit("A") + pl.col("mode_a")
+    plots = _with_texts(plots)
     targets = reference.select("target", "address", "mode_a").unique(maintain_order=True)
     targets = pl.concat([targets.select("target", key=each) for each in (address, code)])
     targets = targets.drop_nulls()
-    valid = pl.when(pl.Series(column(plots, "mode_a_valid", True).astype(bool))).then(code)
+    valid = pl.when(pl.Series(usable.column(plots, "mode_a_valid", True).astype(bool))).then(code)
     own = pl.coalesce(address, valid) if reference["address"].count() else valid
     keyed = plots.select(row=pl.int_range(pl.len()), key=own).filter(reason == "")
     named = keyed["row"].to_numpy()
@@ -97,6 +93,14 @@ def by_identity(
     reason[waiting & (count > 1)] = "two targets"
     alone = count[plot] == 1
     return Matched(plot[alone], row[alone])
+
+
+def _with_texts(plots: "pl.DataFrame") -> "pl.DataFrame":
+    """The plots, with both columns of identity, null where they had none."""
+    import polars as pl
+
+    absent = [name for name in ("address", "mode_a") if name not in plots.columns]
+    return plots.with_columns(pl.lit(None, pl.String).alias(name) for name in absent)
 
 
 def _is_in(values: "pl.Series", some: list[str]) -> Array:
@@ -139,9 +143,9 @@ def by_position(
     """
     usable = np.flatnonzero(reason == "")
     time = plots["time_s"].to_numpy()
-    usable = usable[np.argsort(time[usable], kind="stable")]
     place = plots["range_m"].to_numpy() * np.exp(1j * np.radians(plots["azimuth_deg"].to_numpy()))
-    plot, row, distance = _near(usable, time, place, paths, where, gate_m)
+    plot, row, distance = near(time[usable], place[usable], paths, where, gate_m)
+    plot = usable[plot]
     count = np.bincount(plot, minlength=plots.height)
     waiting = reason == ""
     reason[waiting & (count == 0)] = "no target near"
@@ -155,29 +159,6 @@ def by_position(
     reason[plot[~steady]] = "inconsistent"
     order = np.argsort(plot[steady], kind="stable")
     return Matched(plot[steady][order], row[steady][order])
-
-
-def _near(
-    usable: Array, time: Array, place: Array, paths: Paths, where: Array, gate_m: float
-) -> tuple[Array, Array, Array]:
-    """Every plot and target within the gate: rows of plots, of reports before, and distances."""
-    found: list[tuple[Array, Array, Array]] = []
-    instants = time[usable]
-    edges = np.searchsorted(paths.target, np.arange(paths.target[-1] + 2))
-    for first, end in pairwise(edges.tolist()):
-        if end - first < 2:
-            continue
-        span = np.searchsorted(instants, paths.time[[first, end - 1]], side="left")
-        some, t = usable[slice(*span)], instants[slice(*span)]
-        row = first + np.searchsorted(paths.time[first:end], t, side="right") - 1
-        row = np.minimum(row, end - 2)
-        joined = paths.time[row + 1] - paths.time[row] <= paths.longest_gap_s
-        some, t, row = some[joined], t[joined], row[joined]
-        distance = np.abs(place[some] - paths.linear(where, row, t))
-        close = distance < gate_m
-        found.append((some[close], row[close], distance[close]))
-    plot, row, distance = (np.concatenate(each) for each in zip(*found, strict=True))
-    return plot, row, distance
 
 
 def _nearest(target: Array, time: Array, distance: Array, scan_s: float) -> Array:
