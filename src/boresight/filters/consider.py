@@ -153,9 +153,9 @@ def _later(state: Gaussian, motion: Considered, sign: float) -> Gaussian:
     """The target moved on by its time bias, or back: what is stamped t was measured before."""
     if TIME not in motion.terms:
         return state
-    dims, at = motion.dims, motion.names.index(TIME)
-    T: Array = np.array(np.eye(len(motion.names)), dtype=object)
-    T[:dims, at] = sign * state.mean[dims : 2 * dims]
+    v, rest = state.mean[motion.dims : 2 * motion.dims], np.zeros(len(motion.names) - motion.dims)
+    late = np.array([float(name == TIME) for name in motion.names])
+    T = np.eye(len(motion.names)) + np.outer(np.concatenate([sign * v, rest]), late)
     return Gaussian(state.mean, mirror(T @ state.cov @ T.T))
 
 

@@ -118,7 +118,8 @@ class ConsideredRadar:
         """
         place, speed = (_in_space(a) for a in self.radar.relative(state, motion.dims))
         added = [effects(term, place, speed) for term in motion.terms]
-        return np.array([[each.get(self.names[i], 0.0) for each in added] for i in touched])
+        rows = [[each.get(self.names[i], 0.0) for each in added] for i in touched]
+        return np.array(rows).reshape(len(touched), len(added))
 
     def components(self, motion: Motion) -> tuple[Component, ...]:
         """The radar's formulas, each with what the errors add to it."""
