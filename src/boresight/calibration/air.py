@@ -10,7 +10,7 @@ from boresight.models.atmosphere import ExponentialAtmosphere
 
 Array = Any
 _MOST = 20_000  # pairs looked at: the delay is a smooth curve, and more change no printed digit
-_LEAST_SPREAD_M = 1_000.0  # of range: less than a kilometre says nothing of a slope per kilometre
+_LEAST_SPREAD = 0.01  # of range, in its mean: a ring of targets has no slope over range
 
 
 def air_gain_m_per_km(pairs: Pairs, site: Site) -> float:
@@ -30,7 +30,7 @@ def air_gain_m_per_km(pairs: Pairs, site: Site) -> float:
     if len(rows) > _MOST:  # drawn, because every nth plot may be that of one target
         rows = np.sort(np.random.default_rng(0).choice(rows, _MOST, replace=False))
     range_m = np.linalg.norm(pairs.position[rows], axis=-1)
-    if len(rows) < 2 or np.std(range_m) < _LEAST_SPREAD_M:
+    if len(rows) < 2 or np.std(range_m) < _LEAST_SPREAD * np.mean(range_m):
         return float("nan")
     delay = ExponentialAtmosphere().excess_range(range_m, pairs.height_m[rows], site.height_m)
     from_middle = range_m - range_m.mean()

@@ -31,7 +31,7 @@ _REASONS = {
 
 
 def false_tables(pairing: Pairing, plots: "pl.DataFrame") -> "dict[str, pl.DataFrame]":
-    """Plots by what explains them, by range and by azimuth.
+    """Plots by what explains them, by range and by azimuth, while the reference lasts.
 
     Args:
         pairing: of the plots with a reference.
@@ -50,10 +50,12 @@ def false_tables(pairing: Pairing, plots: "pl.DataFrame") -> "dict[str, pl.DataF
     kinds = _kinds(pairing, plots)
     time, range_m = plots["time_s"].to_numpy(), plots["range_m"].to_numpy()
     azimuth = plots["azimuth_deg"].to_numpy() % 360.0
+    first, last = pairing.due["time_s"].min(), pairing.due["time_s"].max()
     here = np.any(list(kinds.values()), axis=0) & np.isfinite(range_m + azimuth)
+    here &= (time >= first) & (time <= last)
     if not here.any():
         return {}
-    scans = max(np.ptp(time[np.isfinite(time)]) / pairing.scan_s, 1.0)
+    scans = max((last - first) / pairing.scan_s, 1.0)
     sectors = np.arange(0.0, 360.0 + _SECTOR_DEG, _SECTOR_DEG)
     quantities = {
         "range": ("m", range_m, round_edges(range_m[here], _RANGES)),

@@ -58,6 +58,7 @@ def stability(pairs: Pairs, registration: Registered) -> Stability:
     if not len(pairs):
         return Stability()
     order = np.lexsort((pairs.time_s, pairs.target))
+    order = order[_of_their_targets(pairs, registration.after)[pairs.target[order]]]
     pairs = pairs.take(order)
     left = at_door(pairs, registration.after[order])
     sectors, remarks = _sectors(pairs, left)
@@ -65,6 +66,20 @@ def stability(pairs: Pairs, registration: Registered) -> Stability:
     changes, told = _changes(pairs, left)
     tables = {"sectors": sectors, "over_time": over_time, **changes}
     return Stability(tables=tables, remarks=remarks + (told or spells))
+
+
+def _of_their_targets(pairs: Pairs, after: Array) -> Array:
+    """(targets,) False for those that err as a whole as no other does: of a wrong reference."""
+    targets = len(pairs.names)
+    each = Bins(np.zeros(targets), np.zeros(targets), pairs.target)
+    one = Bins(np.zeros(1), np.zeros(1), np.zeros(targets, dtype=int))
+    good = np.ones(targets, dtype=bool)
+    for y in after.T:
+        level = medians(y, each)
+        scatter = np.nanmedian(spread(y, each)) if np.isfinite(level).any() else np.nan
+        off = np.abs(level - medians(level, one)[0])
+        good &= ~(off > _GROSS * max(spread(level, one)[0], scatter))
+    return good
 
 
 def _sectors(pairs: Pairs, left: dict[str, Array]) -> "tuple[pl.DataFrame, list[str]]":
@@ -120,17 +135,22 @@ def _means(y: Array, bins: Bins, target: Array, looks: int) -> tuple[Estimates, 
     sector must not make the others look bad.
     """
     cell, who, count, mean = _cells(y, bins, target)
-    X, each = np.eye(len(bins))[cell], np.eye(len(bins))
-    share = np.bincount(cell, weights=count, minlength=len(bins))
-    agree = np.ones(len(bins), dtype=bool)
-    while True:
-        found = estimate(X, mean, count, who, each - agree * share / (agree @ share))
-        beyond = (found.chance() * looks < _CHANCE) & (share > 0.0) & (len(bins) > 1)
+    told = np.bincount(cell, minlength=len(bins)) >= FEWEST
+    rows, each = told[cell], np.eye(len(bins))
+    share = np.bincount(cell, weights=count * rows, minlength=len(bins))
+    agree = told.copy()
+    while told.any():
+        rest = agree * share / (agree @ share) if told.sum() > 1 else 0.0
+        found = estimate(each[cell[rows]], mean[rows], count[rows], who[rows], each - rest)
+        beyond = (found.chance() * looks < _CHANCE) & told & (told.sum() > 1)
         far = np.abs(found.value) * (beyond & agree)
         worst = far > 0.5 * far.max()
         if not worst.any() or (agree & ~worst) @ share < 0.5 * share.sum():
-            return found._replace(value=np.where(share > 0.0, found.value, np.nan)), beyond
+            value, sd = np.where(told, found.value, np.nan), np.where(told, found.sd, np.inf)
+            return found._replace(value=value, sd=sd), beyond
         agree &= ~worst
+    nothing = np.full(len(bins), np.nan)
+    return Estimates(nothing, np.full(len(bins), np.inf), np.ones(len(bins))), told
 
 
 def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ...]:
@@ -139,9 +159,10 @@ def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ..
     Returns:
         (r,) interval, target, number of plots and mean of y, then means of `more`.
     """
-    scale = spread(y, bins)
     off = np.abs(y - medians(y, bins)[bins.index])
-    good = (bins.index >= 0) & (off <= _GROSS * np.maximum(scale, 1e-12)[bins.index])
+    scale = spread(y, bins)
+    least = np.nanmedian(scale) if np.isfinite(scale).any() else 0.0  # of all, where few are alike
+    good = (bins.index >= 0) & (off <= _GROSS * np.maximum(scale, least)[bins.index])
     key = target[good] * len(bins) + bins.index[good]
     count = np.bincount(key)
     cells = np.flatnonzero(count)
@@ -166,8 +187,7 @@ def _changes(pairs: Pairs, left: dict[str, Array]) -> "tuple[dict[str, pl.DataFr
     """Drift and steps, estimated together so that neither is taken for the other."""
     drifts, jumps, said = [], [], []
     for channel, y in left.items():
-        at = steps.find(pairs.time_s, pairs.target, y)
-        found = _trend(pairs, y, at)
+        at, found = _found(pairs, y)
         if found is None:
             continue
         half = found.half_width()
@@ -189,6 +209,16 @@ def _frame(rows: list[Any], *names: str) -> "pl.DataFrame":
 
     numbers = dict.fromkeys(names[1:], pl.Float64)
     return pl.DataFrame(rows, {names[0]: pl.String, **numbers}, orient="row")
+
+
+def _found(pairs: Pairs, y: Array) -> tuple[Array, Estimates | None]:
+    """Times of the steps that stay (what passes is a disturbance), and all sizes, drift first."""
+    at = steps.find(pairs.time_s, pairs.target, y)
+    found = _trend(pairs, y, at)
+    if found is None or (found.chance()[1:] < _CHANCE).all():
+        return at, found
+    at = at[found.chance()[1:] < _CHANCE]
+    return at, _trend(pairs, y, at)
 
 
 def _trend(pairs: Pairs, y: Array, at: Array) -> Estimates | None:

@@ -35,8 +35,8 @@ def find(time_s: Array, target: Array, y: Array) -> Array:
         y: (m,) residuals; NaN is left out.
 
     Returns:
-        (steps,) ascending: each the beginning of the turn that has the first plots after a step. A
-        recording without a step has one in less than 1e-5 of its turns.
+        (steps,) ascending: the time of the first plot after each. A recording without a step has
+        one in less than 1e-5 of its turns.
     """
     here = np.flatnonzero(np.isfinite(y))
     order = here[np.lexsort((time_s[here], target[here]))]
@@ -50,7 +50,8 @@ def find(time_s: Array, target: Array, y: Array) -> Array:
     start = float(when.min())
     turn = ((when - start) / period).astype(int)
     bounded, whole = (np.bincount(turn, np.clip(contrast, -c, c)) for c in (_MOST, _LARGE))
-    return start + period * _peaks(_scaled(bounded, np.bincount(turn)), whole)
+    near = start + period * _peaks(_scaled(bounded, np.bincount(turn)), whole)
+    return np.array([_dated(time_s[here], target[here], y[here], t, period) for t in near])
 
 
 def _contrasts(time_s: Array, target: Array, y: Array, period: float) -> tuple[Array, Array]:
@@ -95,3 +96,30 @@ def _peaks(sums: Array, whole: Array) -> Array:
     passed = np.flatnonzero(np.abs(sums) > _THRESHOLD)
     groups = np.split(passed, np.flatnonzero(np.diff(passed) > _APART) + 1)
     return np.array([group[np.argmax(np.abs(whole[group]))] for group in groups if len(group)])
+
+
+def _dated(time_s: Array, target: Array, y: Array, near: float, period: float) -> float:
+    """Most likely time of a step, given about where it is: that of the first plot after it."""
+    turns = (time_s - near) / period
+    before, after, doubtful = (
+        (turns >= low) & (turns < high)
+        for low, high in ((-BEFORE, -1), (1, BEFORE), (-AFTER, AFTER))
+    )
+    level = _medians(target, y, before)
+    sizes = _medians(target, y, after) - level
+    size = float(np.median(sizes[np.isfinite(sizes)]))
+    rows = np.flatnonzero(doubtful & np.isfinite(level[target]))
+    rows = rows[np.argsort(time_s[rows], kind="stable")]
+    # Sum over the plots from each on of how much likelier they are after the step than before it.
+    gain = np.clip((y[rows] - level[target[rows]]) / size, -1.0, 2.0) - 0.5
+    return float(time_s[rows[np.argmax(np.cumsum(gain[::-1])[::-1])]])
+
+
+def _medians(target: Array, y: Array, some: Array) -> Array:
+    """(targets,) median of some plots of each target; NaN of none."""
+    import polars as pl
+
+    found = pl.DataFrame({"target": target[some], "y": y[some]}).group_by("target").median()
+    out = np.full(int(target.max()) + 1, np.nan)
+    out[found["target"].to_numpy()] = found["y"].to_numpy()
+    return out
