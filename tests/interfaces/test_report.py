@@ -1,17 +1,15 @@
 """The report: whole, offline, readable without scripts, true to its numbers, and drawn."""
 
-import base64
 import json
 import re
-import zlib
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 import worlds
+from html_page import Page, embedded, inflated, needs_chromium, running_browser, unpack
 from scipy import stats
 
 from boresight.errors import OutputError
@@ -19,47 +17,11 @@ from boresight.interfaces.report import beside, consistency, report, residuals, 
 from boresight.interfaces.report.charts import short, typed
 from boresight.interfaces.report.words import clock, figure, gain
 
-CHROMIUM = Path("/usr/bin/chromium")
 MEGABYTE = 1_000_000
-VOID = {"meta", "link", "br", "hr", "img", "input", "path", "rect", "circle"}
 SECTIONS = (
     "verdict plan residuals consistency side-by-side filters targets skipped recording settings "
     "provenance"
 )
-
-needs_chromium = pytest.mark.skipif(
-    not CHROMIUM.exists(), reason="there is no Chromium on this machine to draw the report"
-)
-
-
-class Page(HTMLParser):
-    """Reads a page: its elements, and whether each that opens is closed in turn."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.faults, self.ids, self.links, self.text = [], [], [], [], []
-        self.elements = []
-        self.feed(text)
-        self.faults += [f"never closed: {each}" for each in self.open]
-
-    def handle_starttag(self, tag, attributes):
-        found = dict(attributes)
-        self.elements.append((tag, found))
-        self.ids += [found["id"]] if "id" in found else []
-        self.links += [found["href"]] if "href" in found else []
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attributes):
-        self.elements.append((tag, dict(attributes)))
-
-    def handle_endtag(self, tag):
-        if not self.open or self.open.pop() != tag:
-            self.faults.append(f"{tag} closed at {self.getpos()}")
-
-    def handle_data(self, data):
-        if not {"script", "style"} & set(self.open):
-            self.text.append(data)
 
 
 @pytest.fixture(scope="module")
@@ -82,15 +44,6 @@ def html(result):
 @pytest.fixture(scope="module")
 def page(html):
     return Page(html)
-
-
-def embedded(html, name):
-    """The text of one script element."""
-    return re.search(rf'<script type="[^"]+" id="{name}">(.*?)</script>', html, re.DOTALL)[1]
-
-
-def inflated(html, name):
-    return zlib.decompress(base64.b64decode(embedded(html, name)))
 
 
 def test_the_page_is_balanced_html_in_a_language(page):
@@ -213,12 +166,6 @@ def test_a_notebook_shows_the_page_in_a_frame_of_its_own(result):
 
 
 # ---- what the charts say ----
-
-
-def unpack(array):
-    values = np.frombuffer(base64.b64decode(array["bdata"]), array["dtype"])
-    shape = [int(each) for each in array.get("shape", str(len(values))).split(",")]
-    return values.reshape(shape)
 
 
 def test_arrays_come_back_as_they_went():
@@ -369,18 +316,7 @@ def test_figures_read_as_people_write_them():
 
 @pytest.fixture(scope="module")
 def browser():
-    from playwright.sync_api import sync_playwright
-
-    try:
-        playwright = sync_playwright().start()
-    except Exception as error:  # noqa: BLE001 - Playwright raises nothing more special
-        pytest.skip(f"Playwright's driver does not start here (Debian: libatomic1): {error}")
-    running = playwright.chromium.launch(
-        executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"]
-    )
-    yield running
-    running.close()
-    playwright.stop()
+    yield from running_browser()
 
 
 @pytest.fixture(scope="module")
