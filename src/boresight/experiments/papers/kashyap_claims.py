@@ -204,7 +204,8 @@ def _without_reference(study: Study) -> tuple[Claim, ...]:
             None,
             gap,
             said(min(list(gap.values())[:2]) < gap[none]),
-            f"{_OURS}: median position error there, m, of {few} runs; {reasons(study, 'outage_scans')}",
+            f"{_OURS}: median position error there, m, of {few} runs; "
+            + reasons(study, "outage_scans"),
         ),
         part(
             "KA-E1",

@@ -51,7 +51,8 @@ def write(study: Study, folder: Path) -> list[str]:
     with writing_into(folder):
         for number, draw in drawn.items():
             figure, columns = draw(study)
-            files += save(figure, folder / f"KA-F{number}", columns)
+            named = {name.replace(",", ""): values for name, values in columns.items()}  # in a CSV
+            files += save(figure, folder / f"KA-F{number}", named)
     return files
 
 
