@@ -105,7 +105,7 @@ def _panel(kept: "pl.DataFrame", channel: Channel, against: Against) -> Panel:
     cell = cells(x, bounds)
     data = []
     for place, values, ends in zip(("y", "y2"), (before, after), reach, strict=True):
-        found = _clustered(cell, target, values, len(bounds) - 1)
+        found = clustered(cell, target, values, len(bounds) - 1)
         drawn = (density(x, values, bounds, ends), _line(bounds, found, channel))
         data += [trace | {"yaxis": place} for trace in drawn]
     layout = _layout(channel, against, bounds, reach)
@@ -127,7 +127,7 @@ def _line(bounds: Floats, found: Centre, channel: Channel) -> Chart:
     return median_line((bounds[1:] + bounds[:-1]) / 2, found, channel.unit)
 
 
-def _clustered(
+def clustered(
     cell: NDArray[np.intp], target: NDArray[np.intp], values: Floats, count: int
 ) -> Centre:
     """Return the cells' medians, the residuals of one target taken as alike.
