@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Array = Any
 _HOUR_S = 3_600.0
 _ZONES = 14  # hours that a clock's zone may be off
-_TRIED = 50_000  # plots of a trial
+_TRIED = 20_000  # plots of a trial
 # What biases leave: a plot further from its target than this, by identity, is not of it.
 _RANGE_M, _RANGE_SHARE, _AZIMUTH_RAD = 2_000.0, 0.02, 0.3
 _MOVING_MPS = 3.0  # a parked target is in its place at any hour
@@ -59,25 +59,45 @@ def same_day(plots: "pl.DataFrame", reference: Reference) -> tuple[Reference, li
     return replace(reference, table=table), [said]
 
 
-def explain(plots: "pl.DataFrame", reference: Reference, setting: Setting, found: Compared) -> None:
+def explain(
+    plots: "pl.DataFrame", reference: Reference, setting: Setting, found: Compared
+) -> list[str]:
     """Raise the fault that keeps plots and reference from agreeing, if there is one.
+
+    Returns:
+        A remark if many pairs disagree and nothing explains it.
 
     Raises:
         DataError: no plot has a partner, or most have a wrong one; it names the cause where one
             is recognised.
     """
-    base = _agreeing(plots, found, setting)
-    if base < max(_ENOUGH, _FEW[setting.how] * len(found.plot)):
-        tried = _some(plots)
-        trials = [*_clocks(tried, reference), *_places(tried, reference)]
-        scores = [_score(*trial[1:], setting) for trial in trials]
-        best = int(np.argmax(scores))
-        without = _score(tried, reference, setting)
-        if scores[best] >= max(_ENOUGH, _MORE * without):
-            raise _fault(trials[best][0], scores[best], without)
+    pairs, agree = len(found.plot), _agreeing(plots, found, setting)
+    is_poor = agree < _FEW[setting.how] * pairs
+    if is_poor or agree < _ENOUGH:
+        _raise_recognised(plots.sort("time_s"), reference, setting)
     _check_heights(plots, found)
-    if not len(found.plot):
+    if not pairs:
         raise _nothing(plots, reference, setting, found)
+    if not is_poor or setting.how == "position":
+        return []
+    if not agree:
+        raise _far(plots, setting, found)
+    told = f"Only {agree} of {pairs} plots lie near the target that has their identity"
+    return [f"{told}: the others have wrong references, or errors beyond any bias."]
+
+
+def _raise_recognised(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> None:
+    """Try what may be wrong; raise what makes far more plots agree."""
+    trials = [*_clocks(plots, reference, setting), *_places(plots, reference, setting)]
+    scores = [_score(*trial[1:]) for trial in trials]
+    best, without = int(np.argmax(scores)), _score(plots, reference, setting)
+    if scores[best] >= max(_ENOUGH, _MORE * without):
+        raise DataError(
+            trials[best][0],
+            why=f"with that put right {scores[best]} of the plots tried agree with the reference, "
+            f"as it is {without}",
+            next_step="correct the file or the setting; nothing was changed here",
+        )
 
 
 def _span(table: "pl.DataFrame") -> tuple[float, float]:
@@ -92,32 +112,41 @@ def _overlap(ours: tuple[float, float], theirs: tuple[float, float], days: float
     return min(ours[1], theirs[1] + shift) - max(ours[0], theirs[0] + shift)
 
 
-def _some(plots: "pl.DataFrame") -> "pl.DataFrame":
-    """No more plots than a trial needs, of one piece, from the middle."""
-    first = max(plots.height - _TRIED, 0) // 2
-    return plots.sort("time_s").slice(first, _TRIED) if first else plots
-
-
 def _agreeing(plots: "pl.DataFrame", found: Compared, setting: Setting) -> int:
     """Number of plots that are where their target is, as far as any bias lets them be."""
     if setting.how == "position":
         return int((np.linalg.norm(found.velocity, axis=1) > _MOVING_MPS).sum())
     expected = np.linalg.norm(found.position, axis=1)
-    azimuth = np.arctan2(found.position[:, 1], found.position[:, 0])
-    off = np.abs(column(plots, "range_m", np.nan)[found.plot] - expected)
-    turned = np.radians(column(plots, "azimuth_deg", np.nan)[found.plot]) - azimuth
-    near = (off < _RANGE_M + _RANGE_SHARE * expected) & (np.abs(wrap(turned)) < _AZIMUTH_RAD)
+    off, turned = _off(plots, found)
+    near = (np.abs(off) < _RANGE_M + _RANGE_SHARE * expected) & (np.abs(turned) < _AZIMUTH_RAD)
     return int(near.sum())
 
 
+def _off(plots: "pl.DataFrame", found: Compared) -> tuple[Array, Array]:
+    """(m,) range and azimuth of the plots minus those of their targets, m and rad."""
+    azimuth = np.arctan2(found.position[:, 1], found.position[:, 0])
+    turned = np.radians(column(plots, "azimuth_deg", np.nan)[found.plot]) - azimuth
+    measured = column(plots, "range_m", np.nan)[found.plot]
+    return measured - np.linalg.norm(found.position, axis=1), wrap(turned)
+
+
 def _score(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> int:
-    return _agreeing(plots, compare(plots, reference, setting), setting)
+    """Number of plots that agree; 0 if those that do are too few of the pairs to mean anything."""
+    import polars as pl
+
+    during = pl.col("time_s").is_between(*_span(reference.table))
+    some = plots.filter(during).head(_TRIED)
+    if not some.height:
+        return 0
+    found = compare(some, reference, setting)
+    agree = _agreeing(some, found, setting)
+    return agree if agree >= _FEW[setting.how] * len(found.plot) else 0
 
 
-Trial = tuple[str, "pl.DataFrame", Reference]
+Trial = tuple[str, "pl.DataFrame", Reference, Setting]
 
 
-def _clocks(plots: "pl.DataFrame", reference: Reference) -> Iterator[Trial]:
+def _clocks(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> Iterator[Trial]:
     """The reference with its clock moved by whole hours."""
     import polars as pl
 
@@ -126,18 +155,23 @@ def _clocks(plots: "pl.DataFrame", reference: Reference) -> Iterator[Trial]:
         table = reference.table.with_columns(pl.col("time_s") - seconds)
         way = "ahead of" if hours > 0 else "behind"
         said = f"the reference's clock is {abs(seconds):.0f} s {way} the plots'"
-        yield said, plots, replace(reference, table=table)
+        yield said, plots, replace(reference, table=table), setting
 
 
-def _places(plots: "pl.DataFrame", reference: Reference) -> Iterator[Trial]:
+def _places(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> Iterator[Trial]:
     """Latitude and longitude exchanged; ranges and azimuths in another unit."""
     import polars as pl
 
     swapped = reference.table.rename(
         {"latitude_deg": "longitude_deg", "longitude_deg": "latitude_deg"}
     ).filter(pl.col("latitude_deg").abs() <= 90.0)
-    said = "latitude and longitude are exchanged, in the reference or in the site"
-    yield said, plots, replace(reference, table=swapped)
+    known = replace(reference, table=swapped)
+    yield "latitude and longitude of the reference are exchanged", plots, known, setting
+    site = setting.site
+    if abs(site.longitude_deg) <= 90.0:
+        north, east = site.longitude_deg, site.latitude_deg
+        turned = replace(setting, site=replace(site, latitude_deg=north, longitude_deg=east))
+        yield "latitude and longitude of the site are exchanged", plots, reference, turned
     units = [
         ("range_m", FOOT_M, "the ranges are in feet, not in metres"),
         ("range_m", 1 / FOOT_M, "the ranges were taken for feet, and are metres"),
@@ -146,16 +180,7 @@ def _places(plots: "pl.DataFrame", reference: Reference) -> Iterator[Trial]:
         ("azimuth_deg", DEGREE, "the azimuths are in radians, not in degrees"),
     ]
     for name, factor, said in units:
-        yield said, plots.with_columns(pl.col(name) * factor), reference
-
-
-def _fault(said: str, agree: int, without: int) -> DataError:
-    return DataError(
-        said,
-        why=f"with that put right {agree} of the plots tried agree with the reference, "
-        f"as it is {without}",
-        next_step="correct the file; nothing was changed here",
-    )
+        yield said, plots.with_columns(pl.col(name) * factor), reference, setting
 
 
 def _check_heights(plots: "pl.DataFrame", found: Compared) -> None:
@@ -218,4 +243,17 @@ def _nothing(
         f"no plot could be paired with the reference by {setting.how}",
         why="; ".join(f"{counts[i]} plots: {names[i]}" for i in order),
         next_step="boresight inspect FILE says what both files hold",
+    )
+
+
+def _far(plots: "pl.DataFrame", setting: Setting, found: Compared) -> DataError:
+    """The error for plots that are all somewhere else than the targets of their identity."""
+    off, turned = _off(plots, found)
+    return DataError(
+        "no plot is anywhere near the target that has its identity",
+        where=f"the median plot is {np.median(off) / 1e3:+.1f} km in range and "
+        f"{np.degrees(np.median(turned)):+.1f} degrees in azimuth off",
+        why="no bias of a working radar is as large",
+        next_step=f"check the site ({setting.site.latitude_deg:g}, {setting.site.longitude_deg:g}),"
+        " north, and that the reference is of this recording",
     )

@@ -81,7 +81,7 @@ def pair(
     how = "identity" if has_identity(plots, reference) else "position"
     setting = Setting(site=site, how=how, gate_m=gate_m)
     found = compare(plots, reference, setting)
-    explain(plots, reference, setting, found)
+    remarks += explain(plots, reference, setting, found)
     reasons, counts = np.unique(found.reason[found.reason != ""].astype(str), return_counts=True)
     order = np.argsort(-counts, kind="stable")
     return Pairing(
