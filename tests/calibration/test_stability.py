@@ -208,7 +208,7 @@ def test_a_step_is_known_from_five_turns_after_it():
 @pytest.mark.parametrize("targets", [3, 12])
 def test_at_most_one_false_alarm_in_100_000_turns(targets, tail):
     alarms = [len(steps.find(*plots(seed, targets, 50_000, tail=tail))) for seed in range(4)]
-    assert sum(alarms) <= 2
+    assert sum(alarms) <= 2  # of 200,000
 
 
 def test_levels_agree_with_generalised_least_squares_of_every_plot():

@@ -21,7 +21,7 @@ DOOR = {
 _RANGES = 20
 _SECTOR_DEG = 10.0
 _ENOUGH = 30  # pairs of a standard deviation: its own error is then 15 %, or 20 % for a robust one
-_MAD_TO_SD = 1.4826
+MAD_TO_SD = 1.4826
 
 
 class Registered(Protocol):
@@ -132,21 +132,27 @@ def _noise(name: str, unit: str, bins: Bins, left: dict[str, Array]) -> "pl.Data
     }
     for channel, y in left.items():
         what, channel_unit = channel.rsplit("_", 1)
-        columns[f"{what}_sd_{channel_unit}"] = spread(y, bins)
+        columns[f"{what}_sd_{channel_unit}"] = spread(y, bins.index, len(bins))
     return pl.DataFrame(columns)
 
 
-def medians(y: Array, bins: Bins) -> Array:
-    """(b,) median in each interval; NaN is left out, and stands where nothing is."""
+def medians(y: Array, index: Array, count: int) -> Array:
+    """(count,) median of the rows of each index; NaN is left out, and stands where nothing is.
+
+    Args:
+        y: (m,) values.
+        index: (m,) 0 to count - 1; -1 belongs to none.
+        count: of medians.
+    """
     import polars as pl
 
-    rows = pl.DataFrame({"bin": bins.index, "y": y}).drop_nans().filter(pl.col("bin") >= 0)
-    found = rows.group_by("bin").agg(pl.col("y").median())
-    out = np.full(len(bins), np.nan)
-    out[found["bin"].to_numpy()] = found["y"].to_numpy()
+    rows = pl.DataFrame({"index": index, "y": y}).drop_nans().filter(pl.col("index") >= 0)
+    found = rows.group_by("index").median()
+    out = np.full(count, np.nan)
+    out[found["index"].to_numpy()] = found["y"].to_numpy()
     return out
 
 
-def spread(y: Array, bins: Bins) -> Array:
-    """(b,) robust standard deviation in each interval: 1.4826 median absolute deviations."""
-    return _MAD_TO_SD * medians(np.abs(y - medians(y, bins)[bins.index]), bins)
+def spread(y: Array, index: Array, count: int) -> Array:
+    """(count,) robust standard deviation of each index: 1.4826 median absolute deviations."""
+    return MAD_TO_SD * medians(np.abs(y - medians(y, index, count)[index]), index, count)

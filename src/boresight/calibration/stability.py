@@ -71,14 +71,13 @@ def stability(pairs: Pairs, registration: Registered) -> Stability:
 def _of_their_targets(pairs: Pairs, after: Array) -> Array:
     """(targets,) False for those that err as a whole as no other does: of a wrong reference."""
     targets = len(pairs.names)
-    each = Bins(np.zeros(targets), np.zeros(targets), pairs.target)
-    one = Bins(np.zeros(1), np.zeros(1), np.zeros(targets, dtype=int))
     good = np.ones(targets, dtype=bool)
     for y in after.T:
-        level = medians(y, each)
-        scatter = np.nanmedian(spread(y, each)) if np.isfinite(level).any() else np.nan
-        off = np.abs(level - medians(level, one)[0])
-        good &= ~(off > _GROSS * max(spread(level, one)[0], scatter))
+        level = medians(y, pairs.target, targets)
+        scatter = np.nanmedian(spread(y, pairs.target, targets)) if np.isfinite(y).any() else 0.0
+        one = np.zeros(targets, dtype=int)
+        off = np.abs(level - medians(level, one, 1))
+        good &= ~(off > _GROSS * max(float(spread(level, one, 1)[0]), scatter))
     return good
 
 
@@ -159,8 +158,8 @@ def _cells(y: Array, bins: Bins, target: Array, *more: Array) -> tuple[Array, ..
     Returns:
         (r,) interval, target, number of plots and mean of y, then means of `more`.
     """
-    off = np.abs(y - medians(y, bins)[bins.index])
-    scale = spread(y, bins)
+    off = np.abs(y - medians(y, bins.index, len(bins))[bins.index])
+    scale = spread(y, bins.index, len(bins))
     least = np.nanmedian(scale) if np.isfinite(scale).any() else 0.0  # of all, where few are alike
     good = (bins.index >= 0) & (off <= _GROSS * np.maximum(scale, least)[bins.index])
     key = target[good] * len(bins) + bins.index[good]

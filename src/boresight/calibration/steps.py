@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from boresight.calibration.residuals import MAD_TO_SD, medians
+
 Array = Any
 AFTER, BEFORE, LEAST_BEFORE = 5, 20, 5  # plots of a target: a step is known five turns later
 _CLIP = 4.0  # standard deviations of a plot: larger is as large, for an outlier as for a step
-_MOST = 3.3  # of one target, in standard deviations: two together stay below the threshold
-_THRESHOLD = 4.9  # standard deviations of a turn's sum: passed once in a million turns
-_MAD_TO_SD = 1.4826
+_MOST = 3.5  # of one target, in standard deviations: two together stay below the threshold
+_THRESHOLD = 5.1  # standard deviations of a turn's sum: passed once in three million turns
 _LARGE = 10.0  # where a step is looked for once it is there: the bound above has no peak
 _APART = AFTER + BEFORE  # turns: nearer alarms are one
 _LEAST_TURNS = 30
@@ -40,25 +41,26 @@ def find(time_s: Array, target: Array, y: Array) -> Array:
     """
     here = np.flatnonzero(np.isfinite(y))
     order = here[np.lexsort((time_s[here], target[here]))]
-    gap = np.diff(time_s[order])[(np.diff(target[order]) == 0) & (np.diff(time_s[order]) > 0.0)]
+    time_s, target, y = time_s[order], target[order], y[order]
+    gap = np.diff(time_s)[(np.diff(target) == 0) & (np.diff(time_s) > 0.0)]
     if len(gap) < _LEAST_TURNS:
         return np.zeros(0)
     period = float(np.median(gap))
-    when, contrast = _contrasts(time_s[order], target[order], y[order], period)
+    when, contrast = _contrasts(time_s, target, y, period)
     if len(when) < _LEAST_TURNS:
         return np.zeros(0)
     start = float(when.min())
     turn = ((when - start) / period).astype(int)
     bounded, whole = (np.bincount(turn, np.clip(contrast, -c, c)) for c in (_MOST, _LARGE))
     near = start + period * _peaks(_scaled(bounded, np.bincount(turn)), whole)
-    return np.array([_dated(time_s[here], target[here], y[here], t, period) for t in near])
+    return np.array([_dated(time_s, target, y, t, period) for t in near])
 
 
 def _contrasts(time_s: Array, target: Array, y: Array, period: float) -> tuple[Array, Array]:
     """Plots with enough around them, and mean after minus mean before in its own deviations."""
-    level = np.median(y)
-    scale = max(_MAD_TO_SD * float(np.median(np.abs(y - level))), 1e-12)
-    summed = np.concatenate([[0.0], np.cumsum(np.clip((y - level) / scale, -_CLIP, _CLIP))])
+    own = y - medians(y, target, int(target[-1]) + 1)[target]
+    scale = max(MAD_TO_SD * float(np.median(np.abs(own))), 1e-12)
+    summed = np.concatenate([[0.0], np.cumsum(np.clip(own / scale, -_CLIP, _CLIP))])
     rows = np.arange(len(y))
     first = np.maximum.accumulate(np.where(np.diff(target, prepend=-1) != 0, rows, 0))
     end = rows + AFTER
@@ -73,7 +75,7 @@ def _contrasts(time_s: Array, target: Array, y: Array, period: float) -> tuple[A
     after = (summed[r + AFTER] - summed[r]) / AFTER
     before = (summed[r] - summed[b]) / (r - b)
     raw = (after - before) / np.sqrt(1.0 / AFTER + 1.0 / (r - b))
-    spread = max(_MAD_TO_SD * float(np.median(np.abs(raw))), 1e-12)
+    spread = max(MAD_TO_SD * float(np.median(np.abs(raw))), 1e-12)
     return time_s[r], raw / spread
 
 
@@ -86,7 +88,7 @@ def _scaled(total: Array, count: Array) -> Array:
     busy = scaled[count > 2]
     if not len(busy):
         return scaled
-    wider = _MAD_TO_SD * float(np.median(np.abs(busy)))
+    wider = MAD_TO_SD * float(np.median(np.abs(busy)))
     chance = 2.4 * np.sqrt((AFTER + LEAST_BEFORE) / len(busy))  # two deviations of that number
     return scaled / (wider if wider > 1.0 + chance else 1.0)
 
@@ -105,21 +107,12 @@ def _dated(time_s: Array, target: Array, y: Array, near: float, period: float) -
         (turns >= low) & (turns < high)
         for low, high in ((-BEFORE, -1), (1, BEFORE), (-AFTER, AFTER))
     )
-    level = _medians(target, y, before)
-    sizes = _medians(target, y, after) - level
+    targets = int(target[-1]) + 1
+    level = medians(np.where(before, y, np.nan), target, targets)
+    sizes = medians(np.where(after, y, np.nan), target, targets) - level
     size = float(np.median(sizes[np.isfinite(sizes)]))
     rows = np.flatnonzero(doubtful & np.isfinite(level[target]))
     rows = rows[np.argsort(time_s[rows], kind="stable")]
     # Sum over the plots from each on of how much likelier they are after the step than before it.
     gain = np.clip((y[rows] - level[target[rows]]) / size, -1.0, 2.0) - 0.5
     return float(time_s[rows[np.argmax(np.cumsum(gain[::-1])[::-1])]])
-
-
-def _medians(target: Array, y: Array, some: Array) -> Array:
-    """(targets,) median of some plots of each target; NaN of none."""
-    import polars as pl
-
-    found = pl.DataFrame({"target": target[some], "y": y[some]}).group_by("target").median()
-    out = np.full(int(target.max()) + 1, np.nan)
-    out[found["target"].to_numpy()] = found["y"].to_numpy()
-    return out
