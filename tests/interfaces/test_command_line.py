@@ -147,7 +147,9 @@ def test_the_demo_needs_nothing_and_writes_where_it_stands(tmp_path):
     assert done.returncode == 0, done.stderr
     found = only_object(done)
     assert {"plots", "used", "tracks", "updates", "nis_per_dof", "report"} <= set(found)
-    assert {each["filter"] for each in found["comparisons"]} == {"ekf", "mekf"}
+    assert {"pairs", "targets", "terms", "noise", "air_gain_m_per_km"} <= set(found)
+    names = {each["filter"] for each in found["comparisons"]}
+    assert names == {"ekf", "mekf", "mekf, calibrated"}
     page = (tmp_path / found["report"]).read_text(encoding="utf-8")
     assert "Against the known truth" in page
     assert "boresight demo --json" in page

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 FORMAT, VERSION = "boresight calibration", 1
+_ROUNDING = 1e-9
 
 
 def write_calibration(found: Calibration, path: Path) -> Path:
@@ -125,7 +126,10 @@ def _from_document(path: Path, document: dict[str, Any]) -> Calibration:
     if not np.isfinite(estimate).all():
         raise _no_calibration(path, "an estimate is not a number")
     cov = np.array(kept.covariance.rows)
-    if cov.shape != (len(terms),) * 2 or np.linalg.eigvalsh(cov).min(initial=0.0) < -1e-9:
+    if (
+        np.abs(cov - cov.T).max() > _ROUNDING * np.abs(cov).max()
+        or np.linalg.eigvalsh(cov).min() < -_ROUNDING * np.abs(cov).max()
+    ):
         raise _no_calibration(path, "covariance.rows is not the covariance of covariance.terms")
     return Calibration(
         errors=SystematicErrors(terms=terms, estimate=estimate, cov=cov),
@@ -190,6 +194,9 @@ def _schema() -> Any:
             lost = [n for n in self.covariance.terms if n not in self.terms or n not in TERMS]
             if lost:
                 raise ValueError(f"covariance.terms names {lost[0]}, which is not among the terms")
+            lengths = {len(self.covariance.rows), *map(len, self.covariance.rows)}
+            if lengths != {len(self.covariance.terms)}:
+                raise ValueError("covariance.rows is no square of the size of covariance.terms")
             return self
 
     return Document

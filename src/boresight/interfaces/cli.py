@@ -143,7 +143,7 @@ def calibrate(
     columns: Columns = None,
     output: Output | None = None,
 ) -> Job:
-    """Find what is wrong with a radar against GPS, ADS-B or system tracks."""
+    """Find what is wrong with a radar, against GPS, ADS-B or downlink."""
     return partial(
         calibrating.calibrate,
         file,

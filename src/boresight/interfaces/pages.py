@@ -8,10 +8,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-SUMMARY = "Calibrate radars and track targets from recordings, and say how far to trust it."
+SUMMARY = "Calibrate radars, track targets, and say how far both can be trusted."
 COMMANDS = {
     "inspect": "Say what a recording holds: format, sensors, times, damage.",
-    "calibrate": "Find what is wrong with a radar against GPS, ADS-B or system tracks.",
+    "calibrate": "Find what is wrong with a radar, against GPS, ADS-B or downlink.",
     "track": "Turn a recording into tracks, tables and a report.",
     "demo": "Calibrate and track the built-in recording, against its known truth.",
     "reproduce": "Repeat a paper's tables and claims, with a verdict for each.",
