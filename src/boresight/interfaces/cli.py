@@ -161,7 +161,7 @@ def calibrate(
 
 @app.command
 def demo(*, output: Output = Path("boresight-demo")) -> Job:
-    """Calibrate and track the built-in recording, against its known truth."""
+    """Calibrate and track the built-in recording, against known truth."""
     return partial(jobs.demo, output)
 
 
