@@ -9,7 +9,15 @@ from boresight.calibration.clusters import Solved, delay_variance, solve
 from boresight.calibration.columns import MOVING, Columns, columns, thinned
 from boresight.calibration.fixed_point import fixed_point
 from boresight.calibration.pairs import Pairs
-from boresight.calibration.robust import Classes, Errors, Laws, classify, first_laws, refit
+from boresight.calibration.robust import (
+    Classes,
+    Errors,
+    Laws,
+    classify,
+    first_laws,
+    late_is_apart,
+    refit,
+)
 from boresight.models.systematic import TERMS
 
 Array = Any
@@ -116,6 +124,9 @@ def fit(pairs: Pairs, terms: tuple[str, ...], *, robust: bool, delays: bool) -> 
     few = thinned(pairs, _START_PAIRS)
     data = columns(few, terms, np.zeros(len(terms)))
     state, converged = _search(data, _start(data, prior, robust=robust), prior, delays=delays)
+    if robust and not late_is_apart(_errors(data, state)[0], state.laws):
+        state = state._replace(laws=state.laws.without_late())
+        state, converged = _search(data, state, prior, delays=delays)
     if few is not pairs or any(term in MOVING for term in terms):
         data = columns(pairs, terms, state.terms)
         state, converged = _search(data, state, prior, delays=delays)
@@ -219,7 +230,7 @@ class Packing(NamedTuple):
                 laws.tail_share,
                 np.log(laws.tail_sd),
                 laws.wrong,
-                [np.log(laws.place_m), laws.late_s, np.log(laws.late_sd_s)],
+                [np.log(laws.place_m), laws.late_s, laws.late_sd_s],
                 [state.delay_var / self.delay**2],
             ]
         )
@@ -236,7 +247,7 @@ class Packing(NamedTuple):
             wrong=rest[:2],
             place_m=float(np.exp(rest[2])),
             late_s=float(rest[3]),
-            late_sd_s=float(np.exp(rest[4])),
+            late_sd_s=float(rest[4]) if self.laws.late_sd_s else 0.0,
         ).bounded()
         return State(
             terms * self.terms,

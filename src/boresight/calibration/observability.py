@@ -6,7 +6,7 @@ along which they do not. What a reference or a transponder does wrong it does fo
 target counts as a limited number of independent pairs, however often it was seen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,8 @@ Array = Any
 _WORTH = 30.0  # independent pairs that a target is worth at most
 _SHRUNK = 25.0  # prior variance over posterior: told if the plots shrink the sd to a fifth
 _BELIEVED = 0.5  # of a term's variance: if more is believed than measured, it is not observed
-_CORRELATED = 0.96  # of two terms: their sd are then 3.6 times those of either alone
+_COST = 3.0  # of a term's sd, the others being unknown: hardly separable from there on
+_COMPANY = 0.55  # of a term's largest correlation: others below it are not named with it
 _PART = 0.15  # of a direction's largest weight: terms below it are not named
 
 
@@ -74,35 +75,58 @@ def _unseen(terms: Sequence[str], direction: Array) -> Direction:
 def _hardly(
     terms: Sequence[str], observable: Array, cov: Array, estimate: Array
 ) -> list[Direction]:
-    """Two terms each, whose errors are nearly the same error."""
+    """Terms that lose most of what would be known of them if the others were known."""
     sd = np.sqrt(np.diag(cov))
     correlation = cov / np.outer(sd, sd)
-    found = []
-    for i in range(len(terms)):
-        for j in range(i):
-            if observable[i] and observable[j] and abs(correlation[i, j]) > _CORRELATED:
-                pair = np.zeros(len(terms))
-                pair[j], pair[i] = sd[j], np.sign(correlation[i, j]) * sd[i]
-                found.append(_pair(terms, pair, j, i, cov, estimate))
+    cost = np.sqrt(np.diag(np.linalg.inv(correlation)))
+    found: list[Direction] = []
+    for i in np.argsort(-cost, kind="stable"):
+        if cost[i] < _COST or not observable[i]:
+            continue
+        size = np.where(observable, np.abs(correlation[i]), 0.0)
+        size[i] = 0.0
+        others = np.flatnonzero(size >= _COMPANY * size.max())
+        named = {terms[i], *(terms[j] for j in others)}
+        if size.any() and not any(named <= direction.weights.keys() for direction in found):
+            found.append(_group(terms, int(i), others, cov, estimate))
     return found
 
 
-def _pair(
-    terms: Sequence[str], direction: Array, i: int, j: int, cov: Array, estimate: Array
-) -> Direction:
-    """Say what of two terms is known: the combination whose variance is least."""
-    weights = _weights(terms, direction)
-    lever = -cov[i, j] / cov[j, j]
-    sd = np.sqrt(max(cov[i, i] + lever * cov[i, j], 0.0))
-    first, second = TERMS[terms[i]], TERMS[terms[j]]
-    correlation = cov[i, j] / np.sqrt(cov[i, i] * cov[j, j])
+def _group(terms: Sequence[str], i: int, others: Array, cov: Array, estimate: Array) -> Direction:
+    """Terms that move together, and what is known of them nevertheless."""
+    sd = np.sqrt(np.diag(cov))
+    correlation = cov[i, others] / (sd[i] * sd[others])
+    order = np.argsort(-np.abs(correlation))
+    others, correlation = others[order], correlation[order]
+    lever = np.linalg.solve(cov[np.ix_(others, others)], cov[others, i])
+    left = np.sqrt(max(cov[i, i] - cov[i, others] @ lever, 0.0))
+    known = estimate[i] - lever @ estimate[others]
+    names, unit = [terms[i], *(terms[j] for j in others)], TERMS[terms[i]].unit
+    combination = _combination(names, lever)
     words = (
-        f"{first.words} and {second.words} are hardly separable here "
-        f"(correlation {correlation:.2f}): well known is only {first.words} "
-        f"{lever:+.3g} × {second.words} = {estimate[i] + lever * estimate[j]:.3g} "
-        f"± {sd:.2g} {first.unit}."
+        f"{_names(names)} are hardly separable here (correlation {correlation[0]:.2f}): "
+        f"{_word(terms[i])} has a standard deviation of {sd[i]:.2g} {unit}, and "
+        f"would have {left:.2g} {unit} if the others were known. Well known is "
+        f"{combination}: {known:.4g} ± {left:.2g} {unit}."
     )
-    return Direction(weights=weights, observable=True, correlation=float(correlation), words=words)
+    weights = dict(zip(names, (sd[i], *(correlation * sd[others])), strict=True))
+    return Direction(
+        weights={name: float(weight) for name, weight in weights.items()},
+        observable=True,
+        correlation=float(correlation[0]),
+        words=words,
+    )
+
+
+def _combination(names: Sequence[str], lever: Array) -> str:
+    """The combination of terms that is known best."""
+    if {*names} == {"range_bias_m", "range_gain_m_per_km"}:
+        gain = lever[0] if names[0] == "range_bias_m" else 1.0 / lever[0]
+        return f"the range error at {-gain:.0f} km"
+    parts = [
+        f"{factor:+.3g} × {_word(name)}" for name, factor in zip(names[1:], -lever, strict=True)
+    ]
+    return " ".join([_word(names[0]), *parts])
 
 
 def _weights(terms: Sequence[str], direction: Array) -> dict[str, float]:
@@ -112,16 +136,20 @@ def _weights(terms: Sequence[str], direction: Array) -> dict[str, float]:
     return {terms[k]: float(direction[k]) for k in order}
 
 
-def _names(weights: dict[str, float]) -> str:
+def _names(terms: Iterable[str]) -> str:
     """'range bias and range gain'."""
-    words = [TERMS[term].words for term in weights]
+    words = [_word(term) for term in terms]
     text = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
     return text[0].upper() + text[1:]
+
+
+def _word(term: str) -> str:
+    """A term inside a list, where its own comma would mislead."""
+    return TERMS[term].words.replace(",", "")
 
 
 def _sum(weights: dict[str, float]) -> str:
     """'100 m of range bias together with -2 m/km of range gain'."""
     return " together with ".join(
-        f"{weight:.3g} {TERMS[term].unit} of {TERMS[term].words}"
-        for term, weight in weights.items()
+        f"{weight:.3g} {TERMS[term].unit} of {_word(term)}" for term, weight in weights.items()
     )

@@ -29,7 +29,7 @@ _NEAREST = 1.5  # below it the two laws are one
 _WORTH = 5.0  # plots that the belief in the widest law is worth
 _OUTLIER_M, _LATE_S = 1_000.0, 2.0  # believed scales of outliers, each worth one pair
 _LATEST_S = (1e-2, 1e4)  # bounds of its scale
-_BLUR = 1.0  # scale of a wrong time over the noise of a place, at least
+_TOLD = 2.5  # standard deviations between no wrong time and the usual wrong time, at least
 _APART = 3.0  # outliers' scales over the noise of a place, at least
 _SHARES = (1e-6, 0.5)  # of outliers, and of the wide law: more is not the rarer class any more
 _FINEST = 1e-9  # m or rad: a noise below it is none
@@ -48,7 +48,7 @@ class Laws:
         tail_sd: (k,) of the wide law.
         wrong: (2,) shares of pairs at a wrong place and at a wrong time.
         place_m: scale of the displacement at a wrong place.
-        late_s, late_sd_s: mean and standard deviation of a wrong time.
+        late_s, late_sd_s: mean and standard deviation of a wrong time; 0 and 0 if there is none.
     """
 
     sd: Array
@@ -76,6 +76,10 @@ class Laws:
         share = self.tail_share
         return ((1.0 - share) * self.sd**2 + share * self.tail_sd**2)[:, None]
 
+    def without_late(self) -> "Laws":
+        """No wrong times: what they explained, noise and wrong places explain."""
+        return replace(self, wrong=self.wrong * (1.0, 0.0), late_s=0.0, late_sd_s=0.0)
+
     def bounded(self) -> "Laws":
         """Brought back to where laws can be."""
         if not self.robust:
@@ -84,8 +88,8 @@ class Laws:
             self,
             tail_share=np.clip(self.tail_share, *_SHARES),
             tail_sd=np.clip(self.tail_sd, _NEAREST * self.sd, self.widest * self.sd),
-            wrong=np.clip(self.wrong, _SHARES[0], 0.5 * _SHARES[1]),
-            late_sd_s=float(np.clip(self.late_sd_s, *_LATEST_S)),
+            wrong=np.clip(self.wrong, [_SHARES[0], self.late_sd_s and _SHARES[0]], _SHARES[1] / 2),
+            late_sd_s=float(np.clip(self.late_sd_s, *_LATEST_S)) if self.late_sd_s else 0.0,
         )
 
 
@@ -192,7 +196,7 @@ def classify(errors: Errors, laws: Laws) -> Classes:
     inlier = (at.seen * (first + np.log1p(odds))).sum(0) + np.log1p(-laws.outlier_share)
     late, late_s, late_var = _late(errors, laws)
     density = np.stack([_displaced(errors, laws), late, inlier])
-    density[:2] += np.log(laws.wrong)[:, None]
+    density[:2] += np.log(np.maximum(laws.wrong, _SHARES[0]))[:, None]
     chance = np.exp(density - density.max(0))
     wrong, tail = chance[:2] / chance.sum(0), odds / (1.0 + odds)
     belongs = (1.0 - wrong.sum(0)) * at.seen
@@ -217,6 +221,9 @@ def _distance2(errors: Errors, laws: Laws) -> Array:
 def _late(errors: Errors, laws: Laws) -> tuple[Array, Array, Array]:
     """(m,) log density of a wrong time, times (2 pi)^(k/2); mean and variance of that time."""
     at = errors.at
+    if not laws.late_sd_s:
+        nothing = np.zeros_like(at.count)
+        return nothing - np.inf, nothing, nothing
     variance = laws.variance + at.extra
     inverse = at.seen / variance
     left = errors.left - laws.late_s * at.second
@@ -268,13 +275,24 @@ def _displacement(errors: Errors, classes: Classes, laws: Laws) -> float:
 
 def _lateness(errors: Errors, classes: Classes, laws: Laws) -> tuple[float, float]:
     """Mean and standard deviation of a wrong time."""
+    if not laws.late_sd_s:
+        return 0.0, 0.0
     wrong = classes.wrong[1]
     total = wrong.sum() + 1.0
     late = (wrong * classes.late_s).sum() / total
     spread = (classes.late_s - late) ** 2 + classes.late_var
     square = (wrong * spread).sum() + _LATE_S**2 + late**2
-    least = _BLUR * _noise_m(errors, laws) / max(errors.at.speed_mps, _SLOWEST)
-    return float(late), float(max(np.sqrt(square / total), least))
+    return float(late), float(max(np.sqrt(square / total), _blur_s(errors, laws)))
+
+
+def late_is_apart(errors: Errors, laws: Laws) -> bool:
+    """Whether wrong times are a class of their own, and not the noise's or the reference's tail."""
+    return abs(laws.late_s) > _TOLD * float(np.hypot(laws.late_sd_s, _blur_s(errors, laws)))
+
+
+def _blur_s(errors: Errors, laws: Laws) -> float:
+    """Noise of a place as a noise of time."""
+    return _noise_m(errors, laws) / max(errors.at.speed_mps, _SLOWEST)
 
 
 def _noise_m(errors: Errors, laws: Laws) -> float:
