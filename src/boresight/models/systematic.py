@@ -26,7 +26,7 @@ from boresight.maths import select, wrap
 
 Array = Any
 CHANNELS = ("range_m", "azimuth_rad", "elevation_rad")
-_DEGREE = np.pi / 180.0
+_DEGREE, _TURN = np.pi / 180.0, 2.0 * np.pi
 _FLOOR = 1e-6  # m²: a target at the radar, or right above it, still has finite effects
 _ROUNDS = 3  # of taking the errors out at the corrected place: each leaves a hundredth or less
 
@@ -145,11 +145,13 @@ class SystematicErrors:
     cov: Array
 
     def __post_init__(self) -> None:
-        """Terms must be known, numbers finite and of their shape."""
+        """Terms must be known and named once, numbers finite and of their shape."""
         for term in self.terms:
             if term not in TERMS:
                 raise unknown("term of systematic error", term, TERMS)
         n = len(self.terms)
+        if len({*self.terms}) < n:
+            raise UsageError(f"a term of systematic error comes twice: {', '.join(self.terms)}")
         for name, shape in (("estimate", (n,)), ("cov", (n, n))):
             array = np.asarray(getattr(self, name), dtype=float)
             if array.shape != shape or not np.isfinite(array).all():
@@ -194,4 +196,5 @@ class SystematicErrors:
         for _ in range(_ROUNDS):
             error = bias + cosine * np.cos(true) + sine * np.sin(true)
             true = measured - error * _DEGREE
-        return true % (2.0 * np.pi)
+        turned = true % _TURN
+        return np.where(turned == _TURN, 0.0, turned)  # of a hair below zero the rest is a turn
