@@ -94,7 +94,7 @@ def _compared(study: Study, name: str, found: Mapping[str, Tracked]) -> Claim:
     stated, ours = by_channel(methods), by_channel(pfe)
     over = _ratios(methods, pfe)
     words, verdict = of_table(stated | over[0], ours | over[1])
-    count, of = count_of_ratios(methods, pfe)
+    count, of = _ratios_inside(methods, pfe)
     return row(
         study,
         "tables",
@@ -125,7 +125,7 @@ def _ratios(methods: Any, pfe: Any) -> tuple[dict[str, float], dict[str, Array]]
     return stated, ours
 
 
-def count_of_ratios(methods: Any, pfe: Any) -> tuple[int, int]:
+def _ratios_inside(methods: Any, pfe: Any) -> tuple[int, int]:
     """How many of the printed EMEKF/ECMKF ratios are in the bands of ours, and of how many."""
     stated, ours = ratios(methods, "ecmkf", "emekf"), ratios(pfe, "ecmkf", "emekf")
     inside = 0
