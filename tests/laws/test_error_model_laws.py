@@ -207,6 +207,7 @@ def test_a_diagonal_window_is_the_variance_of_the_last_differences(model, seed):
 @given(seed=seeds, floor=st.floats(0, 1))
 def test_a_full_window_is_the_covariance_of_the_last_whole_differences(floor, seed):
     z, place, dt = world(seed, runs=2, scans=30)
+    place[:, ::7, 2] = np.nan  # a reference without height
     model = ErrorModel(
         frame="cartesian", noise="full", window=8, warm_up=5, floor=floor, correction="same epoch"
     )
@@ -276,19 +277,38 @@ def test_an_alarm_is_pages_test_on_normalised_innovations(limit, seed):
     """By hand: sums that start anew at 0, and a filter that starts anew at the alarm."""
     z, place, dt = world(seed, runs=1, scans=60, gaps=0.0)
     z[0, 30:, 0] += 100.0
-    found = correct(z, place, dt, RADAR, model=replace(PLAIN, alarm=limit))
+    found = correct(z, place, dt, RADAR, model=ErrorModel(odds=20.0, alarm=limit))
     dz, _ = differences(z[0], place[0], "polar")
-    mean, variance, up, down, alarms = 0.0, None, 0.0, 0.0, 0
+    mean, variance, up, down, evidence, alarms = 0.0, None, 0.0, 0.0, 0.0, 0
     for k in range(60):
         variance = 9e4 if variance is None else variance + 0.05**2 * dt[0, k]
-        np.testing.assert_allclose(found.error[0, k, 0], mean, atol=1e-7)
-        np.testing.assert_allclose(found.error_cov[0, k, 0, 0], variance, rtol=1e-9)
+        p = 1 / (1 + 20 * np.exp(-evidence))
+        np.testing.assert_allclose(found.probability[0, k, 0], p, rtol=1e-6)
+        np.testing.assert_allclose(found.error[0, k, 0], p * mean, atol=1e-6)
+        spread = p * variance + p * (1 - p) * mean**2  # of an error that may be none
+        np.testing.assert_allclose(found.error_cov[0, k, 0, 0], spread, rtol=1e-6)
         s, nu = variance + 900.0, dz[k, 0] - mean
+        evidence += 0.5 * (dz[k, 0] ** 2 / 900 - nu**2 / s - np.log(s / 900))
+        evidence = min(evidence, 30.0)
         up, down = (max(0.0, t + d * nu / np.sqrt(s) - 0.5) for t, d in ((up, 1), (down, -1)))
         mean, variance = mean + variance / s * nu, variance * 900.0 / s
         if max(up, down) > limit:
             variance, up, down, alarms = None, 0.0, 0.0, alarms + 1
+            evidence = max(evidence, 0.0)
     assert alarms
+
+
+@given(seed=seeds, sign=st.sampled_from([-1, 1]))
+def test_a_radar_that_looks_the_other_way_is_found_out(seed, sign):
+    """An azimuth off by half a turn: differences of either sign are one error."""
+    z, place, dt = world(seed, runs=1, scans=60, gaps=0.0)
+    z[..., 1] += sign * np.pi
+    model = replace(PLAIN, window=20, source="innovation", correction="same epoch")
+    found = correct(z, place, dt, RADAR, model=model)
+    bias = np.exp(1j * found.error[0, -10:, 1])
+    truth = differences(z[0], place[0], "polar")[0][:, 1]
+    assert np.abs(np.angle(bias / np.exp(1j * truth).sum())).max() < SIGMA[1]
+    assert found.noise_cov[0, -1, 1, 1] < 4 * SIGMA[1] ** 2
 
 
 @given(seed=seeds)
