@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boresight.calibration.clusters import Sums
+from boresight.calibration.laws import Setting, setting
 from boresight.calibration.pairs import Pairs
-from boresight.calibration.robust import Setting, setting
 from boresight.models.systematic import SystematicErrors, effects
 
 Array = Any

@@ -8,16 +8,9 @@ import numpy as np
 from boresight.calibration.clusters import Solved, delay_variance, solve
 from boresight.calibration.columns import MOVING, Columns, columns, thinned
 from boresight.calibration.fixed_point import fixed_point
+from boresight.calibration.laws import Classes, Errors, Laws, first_laws
 from boresight.calibration.pairs import Pairs
-from boresight.calibration.robust import (
-    Classes,
-    Errors,
-    Laws,
-    classify,
-    first_laws,
-    late_is_apart,
-    refit,
-)
+from boresight.calibration.robust import classify, late_is_apart, refit
 from boresight.models.systematic import TERMS
 
 Array = Any

@@ -21,6 +21,7 @@ _SHRUNK = 25.0  # prior variance over posterior: told if the plots shrink the sd
 _BELIEVED = 0.5  # of a term's variance: if more is believed than measured, it is not observed
 _COST = 3.0  # of a term's sd, the others being unknown: hardly separable from there on
 _COMPANY = 0.55  # of a term's largest correlation: others below it are not named with it
+_RANGING = {"range_bias_m", "range_gain_m_per_km"}
 _PART = 0.15  # of a direction's largest weight: terms below it are not named
 
 
@@ -98,6 +99,8 @@ def _group(terms: Sequence[str], i: int, others: Array, cov: Array, estimate: Ar
     correlation = cov[i, others] / (sd[i] * sd[others])
     order = np.argsort(-np.abs(correlation))
     others, correlation = others[order], correlation[order]
+    if {terms[i], *(terms[j] for j in others)} == _RANGING and terms[i] != "range_bias_m":
+        i, others = int(others[0]), np.array([i])  # metres are what a reader knows
     lever = np.linalg.solve(cov[np.ix_(others, others)], cov[others, i])
     left = np.sqrt(max(cov[i, i] - cov[i, others] @ lever, 0.0))
     known = estimate[i] - lever @ estimate[others]
@@ -120,9 +123,8 @@ def _group(terms: Sequence[str], i: int, others: Array, cov: Array, estimate: Ar
 
 def _combination(names: Sequence[str], lever: Array) -> str:
     """The combination of terms that is known best."""
-    if {*names} == {"range_bias_m", "range_gain_m_per_km"}:
-        gain = lever[0] if names[0] == "range_bias_m" else 1.0 / lever[0]
-        return f"the range error at {-gain:.0f} km"
+    if {*names} == _RANGING:
+        return f"the range error at {-lever[0]:.0f} km"
     parts = [
         f"{factor:+.3g} × {_word(name)}" for name, factor in zip(names[1:], -lever, strict=True)
     ]
