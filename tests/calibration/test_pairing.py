@@ -44,17 +44,29 @@ def test_a_plot_stands_beside_the_place_and_velocity_its_target_truly_had(tmp_pa
     assert np.array_equal(found.pairs.time_s, plots["time_s"])
 
 
-def test_slow_reports_are_joined_by_a_curve_and_not_by_straight_lines(tmp_path):
+def test_slow_and_uneven_reports_are_joined_by_a_curve_and_not_by_straight_lines(tmp_path):
     (one,) = fleet = [Aircraft(1)]
-    plots = one.plots()
-    found = pair(plots, reference(tmp_path, one.reports(every_s=4.0)), SITE)
-    paths = Paths.of(reference(tmp_path, one.reports(every_s=4.0)))
+    late = np.random.default_rng(4).uniform(0, 1.8, 300)
+    known = reference(tmp_path, one.reports(every_s=2.0, offset_s=late))
+    found = pair(one.plots(), known, SITE)
+    paths = Paths.of(known)
     row = paths.before(np.zeros(len(found.pairs), int), found.pairs.time_s)
     straight = paths.line(row, found.pairs.time_s, found.pairs.height_m, SITE)
-    place, _ = truth_of(fleet, found.pairs)
+    place, speed = truth_of(fleet, found.pairs)
     inside = slice(2, -2)  # the outermost pieces have one neighbour less
     curved = np.abs(found.pairs.position - place)[inside].max()
     assert curved < 0.05 * np.abs(straight - place)[inside].max()
+    assert np.abs(found.pairs.velocity - speed)[inside].max() < 0.05 * METRE_PER_SECOND
+
+
+def test_a_report_stands_for_its_own_instant_and_its_own_target_only(tmp_path):
+    early, late = Aircraft(1), Aircraft(2, start_s=1_700.0)
+    paths = Paths.of(reference(tmp_path, early.reports(), late.reports()))
+    last = early.reports()["time_s"][-1]
+    row = paths.before(
+        np.array([0, 0, 1, 1, 1]), np.array([last, last + 0.1, last, 1_700.0, 999.0])
+    )
+    assert row.tolist() == [598, -1, -1, 600, -1]
 
 
 def test_without_addresses_the_code_and_the_time_decide(tmp_path):
@@ -109,6 +121,9 @@ def test_codes_that_are_garbled_or_of_everybody_are_no_identity(tmp_path):
     reports = [each.reports(mode_a=each.code) for each in fleet]
     found = pair(plots, reference(tmp_path, *reports), SITE)
     assert found.dropped == {"garbled code": 5, "shared code": 3}
+    silent = reference(tmp_path, *(each.drop("address") for each in reports))
+    named = plots.with_columns(address=pl.lit("ABCDEF"))  # which makes no garbled code valid
+    assert pair(named, silent, SITE).dropped == {"not in the reference": 5, "shared code": 3}
 
 
 def test_two_plots_of_one_identity_in_a_scan_are_both_dropped(tmp_path):
@@ -235,7 +250,8 @@ def test_dated_clocks_are_never_moved_by_days(tmp_path):
 def test_scans_that_were_due_are_told_from_those_that_were_seen(tmp_path):
     fleet, plots = sky()
     row = pl.int_range(pl.len()).over("address")
-    heard = plots.filter((row % 10 != 3) & (row % 10 != 4))  # two scans in ten, one after the other
+    inner = (row >= 2) & (row < pl.len().over("address") - 3)
+    heard = plots.filter(inner & (row % 10 != 5) & (row % 10 != 6))  # two scans in a row are missed
     found = pair(heard, reference(tmp_path, *(each.reports() for each in fleet)), SITE)
     assert found.scan_s == SCAN_S
     assert found.due.height == plots.height
@@ -304,37 +320,39 @@ def test_a_gate_is_a_distance(tmp_path):
         pair(plots, known, SITE, gate_m=-1.0)
 
 
-def test_neighbours_are_those_that_trying_all_finds():
+@pytest.mark.parametrize("gate", [40.0, 600.0])
+def test_neighbours_are_those_that_trying_all_finds(gate):
     generator = np.random.default_rng(3)
-    targets, reports, plots, gate = 12, 60, 9_000, 300.0
+    targets, reports, plots = 12, 60, 3_000
     step = generator.choice([0.5, 1.0, 4.0, 9.0], (targets, reports), p=[0.3, 0.5, 0.15, 0.05])
     time = np.cumsum(step, axis=1)
-    speed = generator.normal(0, 40, (targets, 2))
-    where = generator.uniform(-3e3, 3e3, (targets, 1)) + speed[:, :1] * time
-    where = where + 1j * (generator.uniform(-3e3, 3e3, (targets, 1)) + speed[:, 1:] * time)
-    column = {name: np.zeros(where.size) for name in ("latitude", "longitude", "height")}
-    column |= {"pressure": column["height"], "accuracy": column["height"]}
-    paths = Paths(
-        time=time.ravel(),
-        target=np.repeat(np.arange(targets), reports),
-        on_ground=np.zeros(where.size, bool),
-        longest_gap_s=5.0,
-        **column,
-    )
-    when = np.concatenate([generator.uniform(0, 150, plots - 20), time.ravel()[:20]])
-    place = generator.uniform(-4e3, 4e3, plots) + 1j * generator.uniform(-4e3, 4e3, plots)
+    speed = generator.normal(0, 150, (2, targets, 1))
+    north, east = generator.uniform(-5e3, 5e3, (2, targets, 1)) + speed * time
+    where = north + 1j * east
+    paths = paths_of(time)
+    one = generator.integers(0, targets, plots)
+    when = generator.uniform(0, time.max(axis=1)[one])
+    when[:50] = time[one[:50], 7]
+    off = generator.normal(0, gate, (2, plots))
+    place = np.array([np.interp(t, time[k], where[k]) for t, k in zip(when, one, strict=True)])
+    place += off[0] + 1j * off[1]
     found = near(when, place, paths, where.ravel(), gate)
     expected = set()
     for target in range(targets):
-        for i in range(reports - 1):
-            start, end = time[target, i], time[target, i + 1]
-            if end - start > 5.0:
-                continue
-            share = (when - start) / (end - start)
-            inside = (share >= 0) & ((share < 1) | ((share == 1) & (i == reports - 2)))
-            line = where[target, i] + share * (where[target, i + 1] - where[target, i])
-            close = np.flatnonzero(inside & (np.abs(place - line) < gate))
-            expected |= {(int(p), target * reports + i) for p in close}
-    assert len(expected) > 100
+        row = paths.before(np.full(plots, target), when)
+        there = np.flatnonzero(row >= 0)
+        line = np.interp(when[there], time[target], where[target])
+        close = there[np.abs(place[there] - line) < gate]
+        expected |= {(int(p), int(row[p])) for p in close}
+    assert len(expected) > 800
     assert {(int(p), int(r)) for p, r in zip(found[0], found[1], strict=True)} == expected
     assert len(found[0]) == len(expected)
+
+
+def paths_of(time):
+    """Reports of which only times (targets, reports) matter."""
+    nothing = np.zeros(time.size)
+    names = ("latitude", "longitude", "height", "pressure", "accuracy", "on_ground")
+    target = np.repeat(np.arange(len(time)), time.shape[1])
+    columns = dict.fromkeys(names, nothing)
+    return Paths(time=time.ravel(), target=target, longest_gap_s=5.0, **columns)

@@ -115,6 +115,7 @@ def test_a_track_that_changes_its_code_is_two_targets_and_a_missing_code_is_the_
     found = from_recording(recording(tracks=table), "system tracks").table
     counts = found.group_by("target", "mode_a").len().sort("target")
     assert counts["mode_a"].to_list() == ["1111", "2222"]
+    assert counts["target"].to_list() == [0, 1]
     assert counts["len"].sum() == table.height
     assert found["mode_a"].null_count() == 0
 
