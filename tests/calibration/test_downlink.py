@@ -13,6 +13,7 @@ from boresight.calibration.stretches import STEP_DEG
 from boresight.errors import DataError
 from boresight.formats.recording import read_recording
 from boresight.maths.frames import Site, enu_from_geodetic, polar_from_enu
+from boresight.models.atmosphere import ExponentialAtmosphere
 
 SITE = Site(latitude_deg=58.0, longitude_deg=11.0, height_m=120.0)
 EQUATOR, E2 = 6_378_137.0, 0.006_694_379_990_14  # WGS-84
@@ -340,6 +341,22 @@ def test_slow_flight_is_left_out():
     with pytest.raises(DataError, match="fewer than 3 aircraft fly straight") as caught:
         from_downlink(sky(speeds=(25, 45)), SITE)
     assert "stretches: slow" in caught.value.why
+
+
+def test_what_stands_still_is_left_out():
+    plots = sky(17)
+    still = plots.filter(pl.col("address") == "A00000").with_columns(
+        range_m=pl.lit(30e3), azimuth_deg=pl.lit(45.0), address=pl.lit("ABCDEF")
+    )
+    assert answer(pl.concat([plots, still])) == answer(plots)
+
+
+def test_the_air_hardly_matters_and_is_named():
+    plots = sky(18)
+    found = from_downlink(plots, SITE, atmosphere=ExponentialAtmosphere())
+    assert found.atmosphere == "exponential"
+    moved = found.terms["azimuth_bias_deg"].estimate - answer(plots).estimate
+    assert 0.0 < abs(moved) < 0.002
 
 
 def test_the_order_of_rows_and_columns_that_are_not_there_do_not_matter():

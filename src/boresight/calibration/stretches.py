@@ -1,9 +1,9 @@
 """Stretches of straight flight: the direction that a radar sees, and the one aircraft downlink.
 
-A stretch is one straight line in space through the plots of one aircraft over a minute or two. Its
-course is read in the level plane at its own middle, because North there is not the radar's North:
-meridians meet. A downlinked track is an angle to the meridian at its own place, and is carried into
-that plane before it is compared, so that a great circle counts as straight.
+A stretch is one straight line in space through the plots of one aircraft over a minute or two. A
+downlinked track counts from the meridian at its own place, which is not the radar's North because
+meridians meet. It is made a direction in space there, and compared with the line's in the level
+plane at the middle of the stretch; so a great circle counts as straight, and a climb turns nothing.
 """
 
 from dataclasses import dataclass
@@ -22,6 +22,7 @@ GAP_SCANS = 3.5  # two replies in a row may be missing
 ROLL_DEG = 1.5  # beyond: a turn, in which the downlinked track is most of a second old
 SPREAD_DEG = 2.5 * STEP_DEG  # between tracks of one stretch: rounding alone makes one step
 SLOWEST_MPS = 50.0  # what taxies or hovers has no course to speak of
+_STILL_MPS = 1e-9  # what does not move at all is divided by this
 SPEED_SHARE, SPEED_MPS = 0.05, 5.0  # by which a downlinked speed may miss the fitted one
 _CUBIC = np.arange(4.0)
 
@@ -144,7 +145,7 @@ def _fit(reports: Reports, groups: _Groups, site: Site) -> Stretches:
     speed = _dot(velocity, ahead)
     across = _dot(place, aside[groups.of])  # the line itself has no component there
     count = np.bincount(groups.of)
-    sd = np.sqrt(groups.sum(across**2) / (count - 2) / reach2) / speed
+    sd = np.sqrt(groups.sum(across**2) / (count - 2) / reach2) / np.maximum(speed, _STILL_MPS)
     left, rate = _cubic(t, place, groups)
     heard = _heard(reports, groups, site, (ahead, aside), rate)
     reasons = {
@@ -174,7 +175,7 @@ def _axes(centre: Array, velocity: Array, site: Site) -> tuple[Array, Array]:
     """Unit vectors (s, 3) ahead and to the right of a motion, level where it is."""
     up = np.cross(*_compass(centre, site))
     aside = np.cross(velocity, up)
-    aside = aside / np.linalg.norm(aside, axis=-1, keepdims=True)
+    aside = aside / np.maximum(np.linalg.norm(aside, axis=-1, keepdims=True), _STILL_MPS)
     return np.cross(up, aside), aside
 
 
@@ -217,17 +218,13 @@ def _heard(
     reports: Reports, groups: _Groups, site: Site, axes: tuple[Array, Array], rate: Array
 ) -> dict[str, Array]:
     """What the aircraft say of each group's motion, as columns of `Stretches`."""
-    track, said = reports.track[groups.row], reports.speed_mps[groups.row]
-    some = np.flatnonzero(np.isfinite(track))
-    of, count = groups.of[some], len(groups.first)
+    some = np.flatnonzero(np.isfinite(reports.track[groups.row]))
+    row, of, count = groups.row[some], groups.of[some], len(groups.first)
     ahead, aside = axes[0][of], axes[1][of]
+    turned = -_to_the_right(reports.track[row], _compass(reports.enu[row], site), ahead, aside)
     fitted = np.hypot(_dot(rate[some], ahead), _dot(rate[some], aside))
-    difference = said[some] - fitted
+    difference = reports.speed_mps[row] - fitted
     right = ~(np.abs(difference) > SPEED_SHARE * fitted + SPEED_MPS)  # no speed tells nothing
-    east, north = _compass(reports.enu[groups.row[some]], site)
-    sin, cos = np.sin(track[some])[:, None], np.cos(track[some])[:, None]
-    way = sin * east + cos * north
-    turned = -np.arctan2(_dot(way, aside), _dot(way, ahead))
 
     def total(values: Array) -> Array:
         return np.bincount(of, np.where(right, values, 0.0), count)
@@ -238,11 +235,17 @@ def _heard(
     np.minimum.at(low, of, apart)
     np.maximum.at(high, of, apart)
     known = np.isfinite(difference)
-    with_speed = np.maximum(total(known), 1)
     return {
         "turned": mean,
         "tracks": total(np.ones(len(of))).astype(int),
         "wrong": np.bincount(of[~right], minlength=count),
         "spread": high - low,
-        "speed_difference_mps": total(np.where(known, difference, 0.0)) / with_speed,
+        "speed_difference_mps": total(np.where(known, difference, 0.0))
+        / np.maximum(total(known), 1.0),
     }
+
+
+def _to_the_right(track: Array, compass: tuple[Array, Array], ahead: Array, aside: Array) -> Array:
+    """Angle of a track (rad from North) from the direction ahead, rad."""
+    way = np.sin(track)[:, None] * compass[0] + np.cos(track)[:, None] * compass[1]
+    return np.arctan2(_dot(way, aside), _dot(way, ahead))
