@@ -199,6 +199,7 @@ def test_the_verdict_says_what_is_wrong_largest_first(calibration):
     assert "too far clockwise" in found[0].html
     assert f"{80e3 * np.deg2rad(0.535):.0f} m" in found[0].html.replace(",", "")
     assert "Range bias +172 m" in found[1].html
+    assert "ranges are too long" in found[1].html
     early = made.calibration(terms={"time_bias_s": made.term(-0.5, 0.05)})
     assert "stamped too early" in said(early)
     assert "100 m for a target at 80 km and 200 m/s" in said(early)
@@ -298,6 +299,9 @@ def test_whiskers_are_the_intervals_in_metres(calibration):
     reach = unpack(errors["error_x"]["array"])
     assert reach[0] == pytest.approx(1.96 * 9.0, rel=1e-5)
     assert unpack(errors["error_x"]["arrayminus"]) == pytest.approx(reach, rel=1e-5)
+    naive = next(each for each in chart["data"] if "independent" in each.get("name", ""))
+    ends = 172.0 + 1.96 * 0.2 * 9.0 * np.array([-1, 1])  # a fifth of the clustered ones
+    assert unpack(naive["x"])[:2] == pytest.approx(ends, rel=1e-4)
 
 
 def test_correlations_are_those_of_the_covariance(calibration):
@@ -460,11 +464,11 @@ def test_size_does_not_grow_with_the_pairs(html):
 
 
 @pytest.mark.slow
-def test_a_million_pairs_take_seconds():
+def test_a_million_pairs_take_seconds_of_one_processor():
     big = made.calibration(made.residuals(pairs=1_000_000, targets=1_000))
-    started = time.perf_counter()
+    started = time.process_time()  # of this process: neighbours on the machine do not count
     report(calibration=big)
-    assert time.perf_counter() - started < 20
+    assert time.process_time() - started < 10
 
 
 # ---- drawn, in a browser without a network ----

@@ -87,26 +87,28 @@ def panels(residuals: "pl.DataFrame") -> list[Panel]:
     """Draw each channel against range, azimuth, time and height; outliers left out."""
     kept = inliers(residuals)
     against = [each for each in SEEN_AGAINST if each.column in kept.columns]
+    target = kept["target"].rank("dense").to_numpy().astype(int) - 1
     return [
-        _panel(kept, channel, each)
+        _panel(kept, target, channel, each)
         for channel in measured(kept)
         for each in against
         if np.isfinite(column(kept, each.column)).sum() >= FEWEST
     ]
 
 
-def _panel(kept: "pl.DataFrame", channel: Channel, against: Against) -> Panel:
+def _panel(
+    kept: "pl.DataFrame", target: NDArray[np.intp], channel: Channel, against: Against
+) -> Panel:
     before, after = (column(kept, name) for name in channel.columns)
     x = column(kept, against.column) * against.scale
     known = np.isfinite(x) & np.isfinite(before) & np.isfinite(after)
-    x, before, after = x[known], before[known], after[known]
-    target = (kept["target"].rank("dense").to_numpy().astype(int) - 1)[known]
+    x, before, after, target = x[known], before[known], after[known], target[known]
     bounds, reach = edges(x, against), _reach(before, after)
     cell = cells(x, bounds)
     data = []
     for place, values, ends in zip(("y", "y2"), (before, after), reach, strict=True):
         found = clustered(cell, target, values, len(bounds) - 1)
-        drawn = (density(x, values, bounds, ends), _line(bounds, found, channel))
+        drawn = (density(cell, values, bounds, ends), _line(bounds, found, channel))
         data += [trace | {"yaxis": place} for trace in drawn]
     layout = _layout(channel, against, bounds, reach)
     alt = f"{channel.words} residual against {against.words}, before and after the calibration"

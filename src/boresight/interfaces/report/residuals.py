@@ -18,6 +18,7 @@ MARGIN_SDS = 4.0
 FEWEST = 8  # the middle of fewer residuals says nothing
 MEDIAN_COST = 1.2533  # standard error of a median over that of a mean, of a normal law
 NORMAL_95 = 1.96
+MIDDLE_68 = (0.158655, 0.841345)  # one standard deviation about the median of a normal law
 
 
 class Quantity(NamedTuple):
@@ -109,7 +110,7 @@ def _panel(used: "pl.DataFrame", quantity: Quantity, against: Against) -> Panel:
     cell = cells(x, bounds)
     stated = centres(cell, sd, count).median
     data = [
-        density(x, residual, bounds, (-reach, reach)),
+        density(cell, residual, bounds, (-reach, reach)),
         *(_spread(centre, sign * stated) for sign in (-2, 2)),
         median_line(centre, centres(cell, residual, count), quantity.unit),
     ]
@@ -124,7 +125,7 @@ def robust_sd(values: Floats) -> float:
 
     The median absolute deviation would fail on heights: most are repeated to the quantum.
     """
-    low, high = np.quantile(values, [0.158655, 0.841345])
+    low, high = np.quantile(values, MIDDLE_68)
     return float(high - low) / 2
 
 
@@ -141,8 +142,9 @@ def centres(cell: NDArray[np.intp], values: Floats, count: int) -> Centre:
 
     The interval takes values as independent, which those of one turning target are not.
     """
-    order = np.argsort(cell, kind="stable")
-    cuts = np.searchsorted(cell[order], np.arange(1, count))
+    small = cell.astype(np.int16)  # NumPy sorts these by radix, tenfold faster
+    order = np.argsort(small, kind="stable")
+    cuts = np.searchsorted(small[order], np.arange(1, count, dtype=np.int16))
     return Centre(*np.array(list(map(_centre, np.split(values[order], cuts)))).T)
 
 
@@ -151,17 +153,20 @@ def _centre(values: Floats) -> tuple[float, float, float]:
     number = len(values)
     if number < FEWEST:
         return np.nan, np.nan, number
-    error = NORMAL_95 * MEDIAN_COST * robust_sd(values) / np.sqrt(number)
-    return float(np.median(values)), float(error), number
+    low, middle, high = np.quantile(values, (MIDDLE_68[0], 0.5, MIDDLE_68[1]))
+    error = NORMAL_95 * MEDIAN_COST * (high - low) / 2 / np.sqrt(number)
+    return float(middle), float(error), number
 
 
-def density(x: Floats, residual: Floats, bounds: Floats, ends: tuple[float, float]) -> Chart:
-    """Count the residuals in cells of equal size, between `bounds` across and `ends` upwards."""
+def density(
+    cell: NDArray[np.intp], residual: Floats, bounds: Floats, ends: tuple[float, float]
+) -> Chart:
+    """Count the residuals of each cell across in rows of equal height between `ends`."""
     low, high = ends
     columns, step = len(bounds) - 1, (high - low) / ROWS
     inside = (residual >= low) & (residual <= high)
     row = np.minimum(((residual[inside] - low) / step).astype(int), ROWS - 1)
-    flat = row * columns + cells(x[inside], bounds)
+    flat = row * columns + cell[inside]
     counts = np.bincount(flat, minlength=ROWS * columns).reshape(ROWS, columns)
     share = np.where(counts > 0, np.log10(np.maximum(counts, 1)) + 0.15, np.nan)
     return {
