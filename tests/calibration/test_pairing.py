@@ -8,7 +8,7 @@ from flown import SCAN_S, SITE, Aircraft, reference, sky
 from boresight.calibration.interpolation import Paths
 from boresight.calibration.nearby import near
 from boresight.calibration.pairing import pair
-from boresight.errors import UsageError
+from boresight.errors import DataError, UsageError
 from boresight.models.atmosphere import ExponentialAtmosphere
 
 CENTIMETRE, METRE_PER_SECOND = 0.01, 1.0
@@ -136,10 +136,10 @@ def test_two_plots_of_one_identity_in_a_scan_are_both_dropped(tmp_path):
 
 def test_nothing_is_interpolated_over_a_gap(tmp_path):
     one = Aircraft(1)
-    silent = pl.col("time_s").is_between(1_100.0, 1_106.0, closed="none")
-    plots = one.plots()
-    short = reference(tmp_path, one.reports().filter(~silent | (pl.col("time_s") == 1_103.0)))
-    long = reference(tmp_path, one.reports().filter(~silent))
+    plots, reports = one.plots(), one.reports()
+    after = pl.col("time_s") <= 1_100.0
+    short = reference(tmp_path, reports.filter(after | (pl.col("time_s") >= 1_105.0)))
+    long = reference(tmp_path, reports.filter(after | (pl.col("time_s") >= 1_106.0)))
     assert short.longest_gap_s == long.longest_gap_s == 5.0
     assert pair(plots, short, SITE).dropped == {}
     inside = plots.filter(pl.col("time_s").is_between(1_100.0, 1_106.0)).height
@@ -245,6 +245,9 @@ def test_dated_clocks_are_never_moved_by_days(tmp_path):
     found = pair(plots.with_columns(dated), reference(tmp_path, reports.with_columns(dated)), SITE)
     assert len(found.pairs) == plots.height
     assert not any("midnight" in remark for remark in found.remarks)
+    later = reports.with_columns(dated + 86_400.0)
+    with pytest.raises(DataError, match="do not overlap in time"):
+        pair(plots.with_columns(dated), reference(tmp_path, later), SITE)
 
 
 def test_scans_that_were_due_are_told_from_those_that_were_seen(tmp_path):

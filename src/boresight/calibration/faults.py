@@ -196,8 +196,10 @@ def _check_heights(plots: "pl.DataFrame", found: Compared) -> None:
     }
     for upper, lower in permutations(told, 2):
         both = (told[upper] > _HIGH_M) & (told[lower] > _HIGH_M * FOOT_M)
-        ratio = float(np.median((told[upper] / told[lower])[both])) if both.any() else np.nan
-        if both.sum() >= _ENOUGH and abs(ratio * FOOT_M - 1.0) < _RATIO:
+        if both.sum() < _ENOUGH:
+            continue
+        ratio = float(np.median(told[upper][both] / told[lower][both]))
+        if abs(ratio * FOOT_M - 1.0) < _RATIO:
             raise DataError(
                 f"{upper} are {ratio:.2f} times {lower}: feet taken for metres",
                 where=f"{int(both.sum())} pairs that tell both",

@@ -63,7 +63,7 @@ class _Grid:
         self._keys = key[self.order]
 
     def _cell(self, north: Array, east: Array) -> Array:
-        """Number of the cell; -1 east or west of all, below 0 or too high north or south."""
+        """Number of the cell; none of the targets' where it lies beyond them."""
         column = np.floor((north - self._low[0]) / self._side).astype(np.int64)
         row = np.floor((east - self._low[1]) / self._side).astype(np.int64)
         return np.where((row >= 0) & (row < self._rows), column * self._rows + row, -1)
@@ -72,20 +72,25 @@ class _Grid:
         rank = np.searchsorted(self._instants, time, side=side)
         return cell * (len(self._instants) + 1) + rank
 
+    def _spans(self) -> tuple[Array, Array]:
+        """From when until when each report is the nearest one on its path."""
+        time, joined = self._paths.time, self._joined[:-1]
+        middle, after = (time[:-1] + time[1:]) / 2, np.nextafter(time, np.inf)
+        since = np.append(time[:1], np.where(joined, middle, time[1:]))
+        return since, np.append(np.where(joined, middle, after[:-1]), after[-1:])
+
     def visits(self) -> tuple[Array, Array, Array]:
         """Target of each visit, and its first plot and the one after its last in `order`."""
-        time, joined = self._paths.time, self._joined
-        row = np.tile(np.arange(len(time)), len(_CORNERS))
+        count = len(self._where)
+        row = np.tile(np.arange(count), len(_CORNERS))
         corner = [self._where + self._reach * (north + 1j * east) for north, east in _CORNERS]
         cell = np.concatenate([self._cell(each.real, each.imag) for each in corner])
-        keep = np.unique(np.stack([cell, row]), axis=1) if len(row) else np.empty((2, 0), int)
-        cell, row = keep
-        middle = (time[:-1] + time[1:]) / 2
-        until = np.where(joined[:-1], middle, np.nextafter(time[:-1], np.inf))
-        since = np.where(joined[:-1], middle, time[1:])
-        until = np.append(until, np.nextafter(time[-1:], np.inf))
-        since = np.append(time[:1], since)
-        on = (np.diff(cell) == 0) & (np.diff(row) == 1) & joined[row[:-1]]
+        order = np.lexsort((row, cell))
+        cell, row = cell[order], row[order]
+        new = np.append(True, (np.diff(cell) != 0) | (np.diff(row) != 0))
+        cell, row = cell[new], row[new]
+        since, until = self._spans()
+        on = (np.diff(cell) == 0) & (np.diff(row) == 1) & self._joined[row[:-1]]
         start, stop = np.append(True, ~on), np.append(~on, True)
         first = np.searchsorted(self._keys, self._key(cell[start], since[row[start]], "left") + 1)
         end = np.searchsorted(self._keys, self._key(cell[start], until[row[stop]], "left") + 1)
@@ -96,6 +101,5 @@ def _spread(first: Array, end: Array) -> tuple[Array, Array]:
     """All members of the ranges, and which range each is of."""
     number = np.maximum(end - first, 0)
     which = np.repeat(np.arange(len(first)), number)
-    return np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number) + first[
-        which
-    ], which
+    index = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+    return first[which] + index, which
