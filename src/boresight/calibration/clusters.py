@@ -22,6 +22,7 @@ import numpy as np
 
 Array = Any
 
+_CERTAIN = 1e-15  # of a variance: what is uncertain of it below this is rounding
 _LEVERAGE = 1.0 - 1e-9  # of a target that alone tells a direction: its correction stays finite
 
 
@@ -135,7 +136,8 @@ def _freedom(axis: Array, lifted: Array, share: Array, known: float) -> float:
     length2 = (lever**2).sum(1)
     trace = (own - length2).sum()
     square = (own**2).sum() - 2.0 * (own * length2).sum() + ((lever.T @ lever) ** 2).sum()
-    return float((trace + known) ** 2 / max(square, np.finfo(float).tiny))
+    whole = (trace + known) ** 2
+    return float(whole / square) if square > _CERTAIN * whole else np.inf
 
 
 def _inverse_root(symmetric: Array) -> Array:
