@@ -151,6 +151,7 @@ def test_the_table_holds_the_planted_numbers(html):
     assert azimuth["sd if independent"] == "0.0016"
     assert azimuth["finding"] == "error"
     assert by_name["time bias"]["finding"] == "none shows itself"
+    assert by_name["range gain"]["finding"] == "hardly told apart from others"
 
 
 def test_what_is_not_observable_is_no_number(calibration):
@@ -203,6 +204,18 @@ def test_the_verdict_says_what_is_wrong_largest_first(calibration):
     early = made.calibration(terms={"time_bias_s": made.term(-0.5, 0.05)})
     assert "stamped too early" in said(early)
     assert "100 m for a target at 80 km and 200 m/s" in said(early)
+
+
+def test_zero_is_no_finding_where_another_error_may_stand_for_it(calibration):
+    text = said(calibration, "separable")
+    assert "zero for one means more of another" in text
+    assert "range gain +0.21 m/km (-0.06 to +0.48 m/km)" in text
+    assert "range gain" not in next(
+        each.html for each in sentences(calibration, AT, {}) if "No error shows" in each.html
+    )
+    apart = replace(calibration, directions=())
+    assert "zero for one" not in said(apart)
+    assert "No error shows itself in range gain" in said(apart)
 
 
 def test_cosine_and_sine_are_said_as_a_swing(calibration):

@@ -22,6 +22,7 @@ SIGNS = [[0, "#0072B2"], [0.5, "#ffffff"], [1, "#D55E00"]]
 COLORS = {
     Finding.ERROR: charts.ORANGE,
     Finding.NONE: charts.BLUE,
+    Finding.SHARED: charts.GREEN,
     Finding.WITHIN: charts.PURPLE,
     Finding.ENDLESS: charts.MUTED,
 }
@@ -38,7 +39,7 @@ def _terms(calibration: "Calibration", typical: Typical) -> Panel:
     found, names = findings(calibration), list(calibration.terms)
     rows = [_row(n, calibration, typical.metres(n), float(i)) for i, n in enumerate(names)]
     kinds = {kind: [row for row in rows if found[row.name] == kind] for kind in Finding}
-    bounded = kinds[Finding.ERROR] + kinds[Finding.NONE] + kinds[Finding.WITHIN]
+    bounded = [row for row in rows if found[row.name] not in (Finding.ENDLESS, Finding.UNSEEN)]
     data = [
         _bars([row for row in bounded if row.beyond], "with the systematic part", 3, _systematic),
         _bars(bounded, "if all pairs were independent", 16, _naive),

@@ -13,6 +13,7 @@ class Finding(StrEnum):
 
     ERROR = "error"
     NONE = "none shows itself"
+    SHARED = "hardly told apart from others"
     WITHIN = "within the systematic part"
     ENDLESS = "no interval: too few targets"
     UNSEEN = "not observable: no number to use"
@@ -32,7 +33,10 @@ def _finding(name: str, term: "TermFound", calibration: "Calibration") -> Findin
         return Finding.ENDLESS
     if low > beyond or high < -beyond:
         return Finding.ERROR
-    return Finding.WITHIN if low > 0 or high < 0 else Finding.NONE
+    if low > 0 or high < 0:
+        return Finding.WITHIN
+    shared = any(name in direction.weights for direction in calibration.directions)
+    return Finding.SHARED if shared else Finding.NONE
 
 
 def systematic(name: str, calibration: "Calibration") -> float:

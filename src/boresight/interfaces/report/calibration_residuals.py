@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 SEEN_AGAINST = (AGAINST[1], AGAINST[2], AGAINST[0], Against("height_m", "height, km", 40, 1e-3))
 BOTTOM_LEAST, GAP = 0.27, 0.05  # of the chart's height: the lower drawing, and between the two
 EXTREME = 0.003
+PAIRS_A_CELL, FEWEST_CELLS = 60, 12  # few pairs make few cells, whose medians say something
+ROUND = (36, 24, 18, 12)  # cells of a circle
 FEWEST_TARGETS = 3  # the interval of two is six times that of many
 
 
@@ -103,7 +105,7 @@ def _panel(
     x = column(kept, against.column) * against.scale
     known = np.isfinite(x) & np.isfinite(before) & np.isfinite(after)
     x, before, after, target = x[known], before[known], after[known], target[known]
-    bounds, reach = edges(x, against), _reach(before, after)
+    bounds, reach = edges(x, _coarser(against, len(x))), _reach(before, after)
     cell = cells(x, bounds)
     data = []
     for place, values, ends in zip(("y", "y2"), (before, after), reach, strict=True):
@@ -114,6 +116,13 @@ def _panel(
     alt = f"{channel.words} residual against {against.words}, before and after the calibration"
     name = f"before-after-{channel.stem}-{against.column.split('_')[0]}"
     return Panel(name, {"data": data, "layout": layout}, alt)
+
+
+def _coarser(against: Against, pairs: int) -> Against:
+    most = min(max(pairs // PAIRS_A_CELL, FEWEST_CELLS), against.cells)
+    if against.column == "azimuth_deg":
+        most = next(each for each in ROUND if each <= most)
+    return against._replace(cells=most)
 
 
 def _reach(before: Floats, after: Floats) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -33,6 +33,7 @@ def sentences(
         _eccentricity(calibration, typical),
         _within(calibration),
         _none(calibration, typical),
+        _shared(calibration),
         _endless(calibration),
         _unseen(calibration),
         _directions(calibration),
@@ -119,6 +120,18 @@ def _none(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
         f"{hidden}.",
         "bias",
     )
+
+
+def _shared(calibration: "Calibration") -> Iterator[Sentence]:
+    """Name those whose interval holds zero only because another may stand for them."""
+    terms = _of(calibration, Finding.SHARED)
+    if terms:
+        yield Sentence(
+            "note",
+            f"Hardly told apart from others, so that zero for one means more of another: "
+            f"{_listed(terms)}. Use them together, as this calibration does.",
+            "separable",
+        )
 
 
 def _listed(terms: "dict[str, TermFound]") -> str:

@@ -12,8 +12,14 @@ MEANING = {
     "azimuth_bias_deg": ("azimuths are too far clockwise", "azimuths are too far anticlockwise"),
     "time_bias_s": ("plots are stamped too late", "plots are stamped too early"),
     "elevation_bias_deg": ("elevations are too high", "elevations are too low"),
-    "site_east_m": ("the antenna stands east of its stated place", "it stands west of it"),
-    "site_north_m": ("the antenna stands north of its stated place", "it stands south of it"),
+    "site_east_m": (
+        "the antenna stands east of its stated place",
+        "the antenna stands west of its stated place",
+    ),
+    "site_north_m": (
+        "the antenna stands north of its stated place",
+        "the antenna stands south of its stated place",
+    ),
 }
 REFERENCES = {
     "adsb": "The reference is ADS-B: where aircraft say they are, mostly by satellite navigation. "
