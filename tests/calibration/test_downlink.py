@@ -417,6 +417,14 @@ def test_half_a_degree_added_to_the_barcelona_hour(barcelona):
     assert after - before == pytest.approx(0.5, abs=0.01)
 
 
+def test_a_tracker_carries_what_rounding_hides():
+    found = from_downlink(sky(3), SITE)
+    term = found.terms["azimuth_bias_deg"]
+    half = 90.0 / 512 / 2
+    carried = float(np.sqrt(found.errors.cov[0, 0]))
+    assert carried == pytest.approx(np.hypot(term.sd, half / np.sqrt(3)), rel=1e-12)
+
+
 def test_the_shipped_recording_gives_back_what_was_planted():
     folder = files("boresight") / "demo"
     facts = json.loads((folder / "facts.json").read_text(encoding="utf-8"))

@@ -79,9 +79,7 @@ def from_downlink(
     settings = _settings(reports, found, good, pooled, lost)
     lost_plots = {name: plots for name, (_, plots) in lost.items()}
     return Calibration(
-        errors=SystematicErrors(
-            terms=(_TERM,), estimate=np.array([pooled.value]), cov=np.array([[pooled.sd**2]])
-        ),
+        errors=_to_carry(pooled),
         terms={_TERM: pooled.term()},
         directions=(),
         noise=_noise(found, pooled),
@@ -97,6 +95,16 @@ def from_downlink(
         settings=settings,
         remarks=_remarks(settings),
     )
+
+
+def _to_carry(pooled: Pooled) -> SystematicErrors:
+    """The bias as a tracker must take it: unsure also of how aircraft round their track.
+
+    The cut is between nothing and half a step; what a tracker carries is its mean square.
+    """
+    cut = (STEP_DEG / 2) ** 2 / 3
+    cov = np.array([[pooled.sd**2 + cut]])
+    return SystematicErrors(terms=(_TERM,), estimate=np.array([pooled.value]), cov=cov)
 
 
 def _turned(
@@ -226,7 +234,8 @@ def _remarks(settings: dict[str, Any]) -> list[str]:
         f"The downlinked track comes in steps of {STEP_DEG:.3f} degrees. Aircraft that round it do "
         "no harm; where they cut it to the step below, the azimuth bias is up to "
         f"{STEP_DEG / 2:.3f} degrees less than the estimate. That cannot be told from a bias, and "
-        "is no part of the interval, which is statistical."
+        "is no part of the interval, which is statistical; it is in the covariance that a tracker "
+        "carries."
     )
     others = (
         "Only the azimuth bias can be found in this way: a time bias, a range gain and a wrong "
