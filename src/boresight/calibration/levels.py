@@ -22,7 +22,7 @@ class Estimates(NamedTuple):
     """Numbers with intervals clustered by target.
 
     Attributes:
-        value, sd: (c,); sd is infinite of fewer than three targets.
+        value, sd: (c,).
         freedom: (c,) degrees of freedom of Student's law.
     """
 
@@ -50,7 +50,7 @@ def estimate(X: Array, y: Array, count: Array, target: Array, contrasts: Array) 
         X: (r, p) regressors.
         y: (r,) means.
         count: (r,) number of plots in each mean.
-        target: (r,) number of the target, ascending.
+        target: (r,) number of the target, ascending; of `FEWEST` targets at least.
         contrasts: (c, p) combinations of the coefficients that are asked for.
     """
     X, y, first = _whitened(X, y, count, target)
@@ -61,7 +61,7 @@ def estimate(X: Array, y: Array, count: Array, target: Array, contrasts: Array) 
     beta = np.linalg.solve(whole + np.diag(faint), X.T @ y)
     scores = np.add.reduceat(X * (y - X @ beta)[:, None], np.concatenate([[0], ends]))
     spread = sandwich(scores, information, faint, contrasts)
-    sd = np.sqrt(np.diag(spread.cov)) if len(first) >= FEWEST else np.full(len(contrasts), np.inf)
+    sd = np.sqrt(np.diag(spread.cov))
     return Estimates(contrasts @ beta, sd, np.maximum(spread.freedom, 1.0))
 
 

@@ -57,7 +57,7 @@ def stability(pairs: Pairs, registration: Registered) -> Stability:
     """
     if not len(pairs):
         return Stability()
-    order = np.lexsort((pairs.time_s, pairs.target))
+    order = np.lexsort((pairs.time_s, pairs.target))  # once, which makes what follows quick
     order = order[_of_their_targets(pairs, registration.after)[pairs.target[order]]]
     pairs = pairs.take(order)
     left = at_door(pairs, registration.after[order])

@@ -2,7 +2,7 @@
 
 At every plot the mean of the next plots of its target is compared with the mean of those before it.
 The target's own error, and whatever the reference does slowly, cancels. Plots of one turn of the
-antenna are added up, each at most so large that no one or two targets can raise an alarm: a
+antenna are added up, each at most so large that one or two targets alone raise no alarm: a
 step of the radar shows in all its targets, a jump in one is that target's or its reference's.
 The scales are those that the recording itself has, so noise that is not white widens them.
 This is a generalised likelihood ratio over a moving window, for a step of unknown size.
