@@ -49,9 +49,9 @@ def test_slow_and_uneven_reports_are_joined_by_a_curve_and_not_by_straight_lines
     late = np.random.default_rng(4).uniform(0, 1.8, 300)
     known = reference(tmp_path, one.reports(every_s=2.0, offset_s=late))
     found = pair(one.plots(), known, SITE)
-    paths = Paths.of(known)
+    paths = Paths.of(known, SITE)
     row = paths.before(np.zeros(len(found.pairs), int), found.pairs.time_s)
-    straight = paths.line(row, found.pairs.time_s, found.pairs.height_m, SITE)
+    straight = paths.line(row, found.pairs.time_s, found.pairs.height_m)
     place, speed = truth_of(fleet, found.pairs)
     inside = slice(2, -2)  # the outermost pieces have one neighbour less
     curved = np.abs(found.pairs.position - place)[inside].max()
@@ -61,7 +61,7 @@ def test_slow_and_uneven_reports_are_joined_by_a_curve_and_not_by_straight_lines
 
 def test_a_report_stands_for_its_own_instant_and_its_own_target_only(tmp_path):
     early, late = Aircraft(1), Aircraft(2, start_s=1_700.0)
-    paths = Paths.of(reference(tmp_path, early.reports(), late.reports()))
+    paths = Paths.of(reference(tmp_path, early.reports(), late.reports()), SITE)
     last = early.reports()["time_s"][-1]
     row = paths.before(
         np.array([0, 0, 1, 1, 1]), np.array([last, last + 0.1, last, 1_700.0, 999.0])
@@ -355,7 +355,7 @@ def test_neighbours_are_those_that_trying_all_finds(gate):
 def paths_of(time):
     """Reports of which only times (targets, reports) matter."""
     nothing = np.zeros(time.size)
-    names = ("latitude", "longitude", "height", "pressure", "accuracy", "on_ground")
+    names = ("ground", "upward", "height", "pressure", "accuracy", "on_ground")
     target = np.repeat(np.arange(len(time)), time.shape[1])
     columns = dict.fromkeys(names, nothing)
     return Paths(time=time.ravel(), target=target, longest_gap_s=5.0, **columns)

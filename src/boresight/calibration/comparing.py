@@ -9,7 +9,7 @@ from boresight.calibration.interpolation import Paths
 from boresight.calibration.matching import Matched, by_identity, by_position, scan
 from boresight.calibration.references import Reference
 from boresight.formats.usable import ANONYMOUS, column, unusable
-from boresight.maths.frames import Site, enu_from_geodetic
+from boresight.maths.frames import Site
 
 if TYPE_CHECKING:
     import polars as pl
@@ -75,7 +75,7 @@ class Compared:
 
 def compare(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> Compared:
     """Match plots to targets and say where those were; what is not compared has its reason."""
-    paths, reason = Paths.of(reference), fit(plots)
+    paths, reason = Paths.of(reference, setting.site), fit(plots)
     if setting.how == "position":
         reason[np.isin(reason, ANONYMOUS)] = ""
     scan_s = scan(plots, reason)
@@ -86,7 +86,7 @@ def compare(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> Co
         matched = by_position(plots, paths, where, reason, scan_s=scan_s, gate_m=setting.gate_m)
     time = column(plots, "time_s", np.nan)[matched.plot]
     height, source = _heights(plots, paths, matched, time, setting.site)
-    position, velocity = paths.at(matched.row, time, height, setting.site)
+    position, velocity = paths.at(matched.row, time, height)
     reason[matched.plot[source < 0]] = "no height"
     slant, ground = np.linalg.norm(position, axis=1), np.hypot(position[:, 0], position[:, 1])
     overhead = (source >= 0) & (ground <= _LOW * slant)
@@ -133,9 +133,9 @@ def _as_seen(paths: Paths, site: Site) -> Array:
     """(n,) complex: slant range of each report at its azimuth, north + i east, m."""
     level: Array = np.where(np.isnan(paths.height), paths.pressure, paths.height)
     level = np.where(np.isnan(level), site.height_m, level)
-    enu: Array = enu_from_geodetic(paths.latitude, paths.longitude, level, site)
-    flat: Array = enu[:, 1] + 1j * enu[:, 0]
-    return flat * (np.linalg.norm(enu, axis=1) / np.maximum(np.abs(flat), 1e-3))
+    place = paths.ground + level[:, None] * paths.upward
+    flat: Array = place[:, 0] + 1j * place[:, 1]
+    return flat * (np.linalg.norm(place, axis=1) / np.maximum(np.abs(flat), 1e-3))
 
 
 def _heights(

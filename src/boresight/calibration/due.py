@@ -40,7 +40,7 @@ def due_scans(
     who, when, seen, row = who[kept], when[kept], seen[kept], row[kept]
     height = found.paths.told_height(row, when, site)
     known = np.isfinite(height)
-    position = found.paths.line(row[known], when[known], height[known], site)
+    position = found.paths.line(row[known], when[known], height[known])
     return pl.DataFrame(
         {
             "time_s": when[known],

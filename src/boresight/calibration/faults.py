@@ -18,7 +18,6 @@ from boresight.formats.clock import DAY_S
 from boresight.formats.schema import DEGREE, FOOT_M, NAUTICAL_MILE_M
 from boresight.formats.usable import column
 from boresight.maths import wrap
-from boresight.maths.frames import enu_from_geodetic
 
 if TYPE_CHECKING:
     import polars as pl
@@ -77,7 +76,7 @@ def explain(
         _raise_recognised(plots.sort("time_s"), reference, setting)
     _check_heights(plots, found)
     if not pairs:
-        raise _nothing(plots, reference, setting, found)
+        raise _nothing(plots, reference, setting.how, found)
     if not is_poor or setting.how == "position":
         return []
     if not agree:
@@ -215,9 +214,7 @@ def _check_heights(plots: "pl.DataFrame", found: Compared) -> None:
             )
 
 
-def _nothing(
-    plots: "pl.DataFrame", reference: Reference, setting: Setting, found: Compared
-) -> DataError:
+def _nothing(plots: "pl.DataFrame", reference: Reference, how: str, found: Compared) -> DataError:
     """The error for plots of which none has a partner: no time, no place, or the reasons."""
     ours, theirs = _span(plots), _span(reference.table)
     if _overlap(ours, theirs, 0.0) <= 0:
@@ -227,10 +224,7 @@ def _nothing(
             f"{theirs[1]:.1f} s",
             next_step="record both at the same time, or name the reference of this recording",
         )
-    paths = found.paths
-    level = np.nan_to_num(paths.height)
-    enu = enu_from_geodetic(paths.latitude, paths.longitude, level, setting.site)
-    nearest = float(np.linalg.norm(enu, axis=1).min())
+    nearest = float(np.linalg.norm(found.paths.ground, axis=1).min())
     furthest = float(np.nanmax(column(plots, "range_m", np.nan), initial=0.0))
     if nearest > furthest + _FAR_M:
         return DataError(
@@ -242,7 +236,7 @@ def _nothing(
     names, counts = np.unique(found.reason.astype(str), return_counts=True)
     order = np.argsort(-counts)
     return DataError(
-        f"no plot could be paired with the reference by {setting.how}",
+        f"no plot could be paired with the reference by {how}",
         why="; ".join(f"{counts[i]} plots: {names[i]}" for i in order),
         next_step="boresight inspect FILE says what both files hold",
     )

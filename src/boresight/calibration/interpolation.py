@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from boresight.calibration.references import Reference
-from boresight.maths.frames import Site, ecef_from_geodetic, enu_from_ecef
+from boresight.maths.frames import Site, enu_axes, enu_from_geodetic
 
 Array = Any
 _NORTH_EAST_UP = (1, 0, 2)
@@ -25,7 +25,8 @@ class Paths:
     Attributes:
         time: (n,) s, on the clock of the plots.
         target: (n,) number of what may be interpolated.
-        latitude, longitude: (n,) degrees.
+        ground, upward: (n, 3) north, east, up at the site: the place at height 0, m, and what a
+            metre of height adds to it.
         height: (n,) geometric, m; NaN where not known.
         pressure: (n,) pressure altitude, m; NaN where not known.
         accuracy: (n,) standard deviation of the position in one axis, m; NaN where not told.
@@ -35,8 +36,8 @@ class Paths:
 
     time: Array
     target: Array
-    latitude: Array
-    longitude: Array
+    ground: Array
+    upward: Array
     height: Array
     pressure: Array
     accuracy: Array
@@ -44,14 +45,17 @@ class Paths:
     longest_gap_s: float
 
     @classmethod
-    def of(cls, reference: Reference) -> "Paths":
-        """The paths of a reference, on its own clock."""
+    def of(cls, reference: Reference, site: Site) -> "Paths":
+        """The paths of a reference on its own clock, as seen from a site."""
         table = reference.table
+        place = table["latitude_deg"].to_numpy(), table["longitude_deg"].to_numpy()
+        ground = enu_from_geodetic(*place, 0.0, site)
+        upward = _normal(*np.radians(place)) @ enu_axes(site).T
         return cls(
             time=table["time_s"].to_numpy(),
             target=table["target"].to_numpy(),
-            latitude=table["latitude_deg"].to_numpy(),
-            longitude=table["longitude_deg"].to_numpy(),
+            ground=ground[:, _NORTH_EAST_UP],
+            upward=upward[:, _NORTH_EAST_UP],
             height=table["height_m"].to_numpy(),
             pressure=table["pressure_altitude_m"].to_numpy(),
             accuracy=table["accuracy_m"].to_numpy(),
@@ -110,39 +114,38 @@ class Paths:
         level = np.where(np.isnan(told[0]), told[1], told[0])
         return np.where(np.isnan(level), ground, level)
 
-    def at(self, row: Array, time: Array, height: Array, site: Site) -> tuple[Array, Array]:
+    def at(self, row: Array, time: Array, height: Array) -> tuple[Array, Array]:
         """Position and velocity between reports `row` and `row + 1`.
 
         Args:
             row: (m,) as `before` gives them, none of them -1.
             time: (m,) s.
             height: (m,) above the ellipsoid, m, taken where the reports do not tell theirs.
-            site: origin of the frame.
 
         Returns:
             (m, 3) position, m, and (m, 3) velocity, m/s: north, east, up at the site.
         """
-        near = self._place(row, height, site), self._place(row + 1, height, site)
+        near = self._place(row, height), self._place(row + 1, height)
         step = self.time[row + 1] - self.time[row]
         chord = (near[1] - near[0]) / step[:, None]
         slopes = [
-            self._slope(end, other, position, chord, step, height, site)
+            self._slope(end, other, position, chord, step, height)
             for end, other, position in ((row, row - 1, near[0]), (row + 1, row + 2, near[1]))
         ]
         slopes = _completed(slopes, chord)
         return _hermite(near, slopes, step[:, None], ((time - self.time[row]) / step)[:, None])
 
-    def line(self, row: Array, time: Array, height: Array, site: Site) -> Array:
+    def line(self, row: Array, time: Array, height: Array) -> Array:
         """(m, 3) position as `at` gives it, on the straight line between two reports."""
         share = ((time - self.time[row]) / (self.time[row + 1] - self.time[row]))[:, None]
-        first, last = self._place(row, height, site), self._place(row + 1, height, site)
+        first, last = self._place(row, height), self._place(row + 1, height)
         return (1 - share) * first + share * last
 
-    def _place(self, row: Array, height: Array, site: Site) -> Array:
+    def _place(self, row: Array, height: Array) -> Array:
         told = self.height[row]
         level = np.where(np.isnan(told), height, told)
-        ecef = ecef_from_geodetic(self.latitude[row], self.longitude[row], level)
-        return enu_from_ecef(ecef, site)[:, _NORTH_EAST_UP]
+        place: Array = self.ground[row] + level[:, None] * self.upward[row]
+        return place
 
     def _slope(
         self,
@@ -152,7 +155,6 @@ class Paths:
         chord: Array,
         step: Array,
         height: Array,
-        site: Site,
     ) -> Array:
         """(m, 3) velocity at a report: that of a parabola through the chord and the report beyond.
 
@@ -162,11 +164,19 @@ class Paths:
         beyond = np.where(joined, other, row)
         span = np.abs(self.time[beyond] - self.time[row])
         span = np.where(joined, span, 1.0)[:, None]
-        outward = (self._place(beyond, height, site) - position) / span
+        outward = (self._place(beyond, height) - position) / span
         sign = np.sign(other - row)[:, None]
         step = step[:, None]
         slope = (span * chord + step * sign * outward) / (span + step)
         return np.where(joined[:, None], slope, np.nan)
+
+
+def _normal(latitude: Array, longitude: Array) -> Array:
+    """(n, 3) Earth-centred direction of the ellipsoid's normal, along which heights are counted."""
+    level = np.cos(latitude)
+    return np.stack(
+        [level * np.cos(longitude), level * np.sin(longitude), np.sin(latitude)], axis=-1
+    )
 
 
 def _completed(slopes: list[Array], chord: Array) -> list[Array]:
