@@ -1,11 +1,14 @@
 """The table of residuals is the pairs and their fit in the units of the door; noise is found."""
 
 import numpy as np
+import polars as pl
 import pytest
+from radar_worlds import SIX, Noise, world
 from turning_radar import AZIMUTH_DEG, RANGE_M, Fit, record
 
 from boresight.calibration.bins import joined, round_edges
 from boresight.calibration.pairs import Pairs
+from boresight.calibration.registration import register
 from boresight.calibration.residuals import noise_tables, residual_table
 
 
@@ -113,3 +116,17 @@ def test_rows_outside_all_edges_lie_in_no_interval():
         np.array([-1.0, 0.5, 9.0, np.nan]), np.arange(3.0), np.zeros(4, int), rows=1, targets=1
     )
     assert bins.index.tolist() == [-1, 0, -1, -1]
+
+
+def test_a_registration_leaves_delays_in_and_the_noise_table_takes_them_out():
+    """With the real fit: delays of 60 m, noise of 15 m."""
+    noise = Noise(range_m=15.0, azimuth_deg=0.05, delay_m=60.0)
+    pairs, truth = world(1, pairs=6_000, targets=40, noise=noise)
+    found = register(pairs, SIX)
+    table = residual_table(pairs, found)
+    level = table.group_by("target").agg(pl.col("range_after_m").median())["range_after_m"]
+    assert 40.0 < np.std(level.to_numpy()) < 85.0  # of 60, for 40 targets
+    assert np.corrcoef(table["delay_m"], truth["delay_m"][pairs.target])[0, 1] > 0.99
+    by_range = noise_tables(pairs, found)["noise_by_range"]
+    mean = np.average(by_range["range_sd_m"], weights=by_range["pairs"].to_numpy())
+    assert mean == pytest.approx(15.0, rel=0.06)

@@ -22,7 +22,7 @@ from boresight.calibration.fit import Fit, fit
 from boresight.calibration.observability import observability
 from boresight.calibration.pairs import Pairs
 from boresight.calibration.result import Direction, Law, NoiseFound, TermFound
-from boresight.errors import DataError
+from boresight.errors import DataError, unknown
 from boresight.models.systematic import TERMS, SystematicErrors
 
 Array = Any
@@ -42,7 +42,7 @@ class Registration:
         noise: of the plots.
         outlier: (m,) probability that a pair is no measurement of its target.
         delay_m: (targets,) predicted delay of each transponder; 0 for a target without pairs.
-        after: (m, k) residuals without systematic errors and with delays, m and rad.
+        after: (m, k) residuals without systematic errors, m and rad; delays are still in.
         remarks: sentences for the reader.
     """
 
@@ -73,6 +73,9 @@ def register(
     """
     if not len(pairs):
         raise DataError("no pair of a plot with a reference", next_step="see what was dropped")
+    for term in terms:
+        if term not in TERMS:
+            raise unknown("term of systematic error", term, TERMS)
     found = fit(pairs, terms, robust=robust, delays=delays)
     estimate = found.state.terms
     spread = _spread(found, terms)
@@ -84,9 +87,18 @@ def register(
         noise=_noise(found, pairs.channels),
         outlier=found.in_order(found.classes.outlier),
         delay_m=found.delay_m(len(pairs.names)),
-        after=found.in_order(found.after.T),
+        after=_left(found, pairs),
         remarks=_remarks(found),
     )
+
+
+def _left(found: Fit, pairs: Pairs) -> Array:
+    """(m, k) residuals without terms; delays are in, and NaN where nothing was measured."""
+    left = found.in_order(found.after.T)
+    if "range_m" in pairs.channels:
+        delay = found.delay_m(len(pairs.names))
+        left[:, pairs.channels.index("range_m")] += delay[pairs.target]
+    return np.where(np.isnan(pairs.z), np.nan, left)
 
 
 def _spread(found: Fit, terms: tuple[str, ...]) -> Sandwich:
