@@ -69,6 +69,19 @@ def test_every_report_that_is_refused_is_counted_with_its_reason():
     assert len(found.remarks) == len(found.refused)
 
 
+def test_reports_without_a_time_of_their_position_go_where_others_have_one():
+    row = pl.int_range(pl.len())
+    table = adsb().with_columns(
+        time_kind=where(row < 7, pl.lit("reception"), pl.lit("applicability"))
+    )
+    found = from_recording(recording(table), "adsb")
+    assert found.refused == {"time unknown": 7}
+    none = table.with_columns(time_kind=pl.lit("report"))
+    kept = from_recording(recording(none), "adsb")
+    assert kept.table.height == table.height
+    assert "part of the time bias" in " ".join(kept.remarks)
+
+
 def test_limits_are_settings():
     table = adsb(accuracy_m=926.0, age_s=3.0)
     with pytest.raises(DataError, match="fit to be used"):

@@ -125,5 +125,12 @@ def _made(raw: "pl.DataFrame", kind: str, limits: Limits, skipped: int = 0) -> R
         f"{count} reports of the reference were not used: {MEANINGS[each]}."
         for each, count in refused.items()
     ]
+    if "time_kind" in raw.columns and "time unknown" not in refused:
+        kinds = raw["time_kind"].drop_nulls().unique().sort().to_list()
+        if kinds != ["applicability"]:
+            remarks.append(
+                f"The reference's times are those of {', '.join(kinds)}: by how much its positions "
+                "are older nobody says, and it is part of the time bias."
+            )
     gap = limits.longest_gap_s or longest_gap(table)
     return Reference(kind=kind, table=table, longest_gap_s=gap, refused=refused, remarks=remarks)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 Array = Any
 _RADIUS_95 = 2.4477  # of a circular normal law, in its standard deviations: sqrt(-2 ln 0.05)
 _LOWEST_PA = 6  # the quality of editions 0.2x has no scale; upper codes are those of GPS
+_MOST = 0.5  # of the reports
 _UPDATES = 2.25  # one report may be missing, and clocks jitter
 
 MEANINGS = {
@@ -24,6 +25,7 @@ MEANINGS = {
     "coasted": "extrapolated by the tracker, with no plot in them",
     "poor accuracy": "less accurate than the limit, or of an accuracy said to be unknown",
     "too old": "older than the limit when they were reported",
+    "time unknown": "of unknown time: others say when their position applied, these do not",
     "duplicate": "a second report of one target for the same time",
     "position jump": "too far from the others of their target for anything that flies",
 }
@@ -90,7 +92,7 @@ COLUMNS = (
     "on_ground",
 )
 _NUMBERS = tuple(name for name in COLUMNS if name.endswith(("_s", "_deg", "_m", "_mps")))
-_TEXTS = ("address", "mode_a", "target", "sensor", "quality_kind")
+_TEXTS = ("address", "mode_a", "target", "sensor", "quality_kind", "time_kind")
 _FLAGS = ("on_ground", "coasted", "simulated", "test")
 
 
@@ -193,6 +195,7 @@ def _reasons(table: "pl.DataFrame", kind: str, limits: Limits) -> Array:
         "coasted": pl.col("coasted"),
         "poor accuracy": poor,
         "too old": pl.col("age_s").is_not_nan() & (pl.col("age_s").abs() > limits.age_s),
+        "time unknown": _late(table),
     }
     if kind == "system tracks":
         busiest = table["sensor"].mode().sort().first()
@@ -200,6 +203,18 @@ def _reasons(table: "pl.DataFrame", kind: str, limits: Limits) -> Array:
     names = list(found)
     holds = table.select(**found).to_numpy()
     return np.where(holds.any(axis=1), np.array(names, dtype=object)[holds.argmax(axis=1)], "")
+
+
+def _late(table: "pl.DataFrame") -> "pl.Expr":
+    """Reports that only say when they were received, where most say when their position applied.
+
+    Their positions are older than that by what nobody knows, and would pass for a bias of time.
+    """
+    import polars as pl
+
+    applied = (pl.col("time_kind") == "applicability").fill_null(value=False)
+    most = bool(table.select(applied.mean() > _MOST).item())
+    return ~applied if most else pl.lit(value=False)
 
 
 def _again(table: "pl.DataFrame") -> Array:
