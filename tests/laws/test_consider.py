@@ -1,7 +1,6 @@
 """Laws of a consider filter: Schmidt's in a linear world, the plain one where nothing is uncertain.
 
-A hair (1e-10) of each variance is added to what the errors do to a plot, so agreement is asked to
-1e-8. Statistical tests fix their seeds and state how often they would fail by chance.
+Statistical tests fix their seeds and state how often they would fail by chance.
 """
 
 from dataclasses import dataclass, field, replace
@@ -16,7 +15,7 @@ from boresight.filters.consider import Consider, consider
 from boresight.filters.recursion import OUTPUTS, Recursion, run_recursion
 from boresight.filters.stream import Stream
 from boresight.maths import Gaussian
-from boresight.models.considered import Considered, erring
+from boresight.models.considered import Considered
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Radar
 from boresight.models.systematic import SystematicErrors
@@ -24,8 +23,7 @@ from laws.enrolled import FLAT, PLANE, POINT, SPACE, World
 from oracles import filters as textbook
 from oracles import schmidt
 
-CARRYING = ("ekf", "ekf-sequential", "iekf", "mekf", "mekf-block", "ukf", "ckf", "iplf")
-JACOBIAN = CARRYING[:5]
+CARRYING = ("ekf", "ekf-sequential", "iekf", "mekf", "mekf-block", "ducm", "ukf", "ckf", "iplf")
 SIX = (
     "range_bias_m",
     "range_gain_m_per_km",
@@ -51,16 +49,14 @@ class LinearErrors:
     def names(self):
         return self.radar.names
 
-    def touched(self, _terms):
-        return tuple(range(len(self.names)))
-
-    def design(self, _state, _motion, touched):
-        return np.array([self.effects[i] for i in touched])
+    def displaced(self, _state, motion):
+        k, n = len(self.names), motion.own
+        return np.concatenate([np.array(self.effects), np.zeros((n - k, len(motion.terms)))])
 
     def components(self, motion):
         own = motion.own
         return tuple(
-            erring(part, own, lambda state, i=i: self.effects[i] @ state[own:])
+            replace(part, value=lambda s, i=i: s[i] + self.effects[i] @ s[own:])
             for i, part in enumerate(self.radar.components(motion.inner))
         )
 
@@ -196,7 +192,7 @@ def begun(recursion, z):
     return recursion.method.start(z, recursion.motion, recursion.sensor, speed_mps=150.0)
 
 
-@pytest.mark.parametrize("name", JACOBIAN)
+@pytest.mark.parametrize("name", CARRYING)
 def test_with_nothing_uncertain_it_is_the_plain_filter(name):
     truth = flights(6, 12, seed=1)
     z = seen(truth, np.zeros((6, 6)), seed=1)
@@ -208,10 +204,10 @@ def test_with_nothing_uncertain_it_is_the_plain_filter(name):
     ours = run_recursion(recursion, z[:, 1:], 4.0, start, outputs=OUTPUTS)
     own = Gaussian(start.mean[:, :4], start.cov[:, :4, :4])
     theirs = run_recursion(plain, z[:, 1:], 4.0, own, outputs=OUTPUTS)
-    np.testing.assert_allclose(ours.mean[..., :4], theirs.mean, rtol=1e-8, atol=1e-5)
-    np.testing.assert_allclose(ours.cov[..., :4, :4], theirs.cov, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(ours.mean[..., :4], theirs.mean, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(ours.cov[..., :4, :4], theirs.cov, rtol=1e-8, atol=1e-8)
     for key in ("nis", "loglik", "innovation", "variance", "status", "dof"):
-        np.testing.assert_allclose(ours.others[key], theirs.others[key], rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(ours.others[key], theirs.others[key], rtol=1e-8, atol=1e-10)
 
 
 def test_a_time_bias_moves_what_is_told_along_the_flight_and_nothing_else():
@@ -257,7 +253,7 @@ def test_an_empty_plot_changes_nothing_bit_for_bit(name):
 
 
 @pytest.mark.parametrize("name", CARRYING)
-def test_a_batch_is_its_lanes_and_a_stream_is_the_batch_bit_for_bit(name):
+def test_a_batch_is_its_lanes_bit_for_bit_and_a_stream_is_the_batch(name):
     recursion = polar(name, covariance(np.random.default_rng(5), SPREADS))
     z = seen(flights(5, 6, seed=5), np.zeros((5, 6)), seed=5)
     start, z = begun(recursion, z[:, 0]), z[:, 1:]
@@ -272,7 +268,8 @@ def test_a_batch_is_its_lanes_and_a_stream_is_the_batch_bit_for_bit(name):
     state = stream.start(Gaussian(start.mean[3], start.cov[3]))
     for t in range(z.shape[1]):
         state = stream(state, z[3, t], 4.0)
-        np.testing.assert_array_equal(state.cov, batch.cov[3, t])
+        # Another program, whose multiply-adds may be fused elsewhere.
+        np.testing.assert_allclose(state.cov, batch.cov[3, t], rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["ekf", "mekf", "ckf"])
@@ -355,7 +352,7 @@ def test_a_start_errs_as_its_plot_does(radar):
         np.testing.assert_allclose(shift[:, :, j], found, rtol=1e-4, atol=1e-3, err_msg=term)
 
 
-@pytest.mark.parametrize("name", ["ducm", "cmkf", "ckf-spherical", "line-of-sight", "range-rate"])
+@pytest.mark.parametrize("name", ["ckf-spherical", "line-of-sight"])
 def test_filters_that_keep_or_take_something_else_refuse(name):
     with pytest.raises(UsageError, match="cannot carry"):
         polar(name, np.eye(6))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from boresight.errors import UsageError
-from boresight.maths import gradient
 from boresight.maths.frames import Site
 from boresight.models.considered import Considered, ConsideredRadar, own_states
 from boresight.models.motion import ConstantVelocity, WithHeightOffset
@@ -45,20 +44,42 @@ def test_plots_err_by_what_the_errors_are():
     np.testing.assert_allclose(added, expected, rtol=1e-9, atol=1e-9)
 
 
-def test_gradients_by_an_error_are_its_effect_and_by_the_target_those_of_the_clean_radar():
-    state = np.append(TARGET, np.zeros(4))
-    E = sensor().design(TARGET, MOTION, sensor().touched(TERMS))
-    clean_parts, dirty_parts = RADAR.components(INNER), sensor().components(MOTION)
-    for clean, dirty, effect in zip(clean_parts, dirty_parts, [*E, np.zeros(4)], strict=True):
-        _, h = gradient(dirty.value, state)
-        np.testing.assert_allclose(h[:7], gradient(clean.value, TARGET)[1], rtol=1e-12)
-        np.testing.assert_allclose(h[7:], effect, rtol=1e-12)
+ALL = (*TERMS, "azimuth_sin_deg", "site_east_m", "site_north_m", "time_bias_s")
+RAISED = Radar(range_m=30.0, azimuth_deg=0.1, elevation_deg=0.1)
 
 
-def test_only_what_terms_can_change_is_touched():
-    assert sensor().touched(("azimuth_bias_deg",)) == (1,)
-    assert sensor().touched(("time_bias_s",)) == (0, 1)
-    assert sensor().touched(()) == ()
+@pytest.mark.parametrize("radar", [RADAR, RAISED], ids=["height", "elevation"])
+def test_an_erring_radar_sees_the_target_where_it_is_displaced_to(radar):
+    terms = (*ALL, "elevation_bias_deg") if radar is RAISED else ALL
+    motion = Considered(inner=INNER, terms=terms)
+    seen = ConsideredRadar(radar=radar, cov=np.eye(len(terms)))
+    M = seen.displaced(TARGET, motion)
+    clean, dirty = radar.components(INNER), seen.components(motion)
+    for j in range(len(terms)):
+        b = 1e-3 * np.eye(len(terms))[j]
+        for here, there in zip(clean, dirty, strict=True):
+            moved = here.value(TARGET + M @ b) - here.value(TARGET)
+            if here.name == "pressure_altitude_m":  # heights are taken as they are
+                assert abs(moved) <= 0.01 * np.linalg.norm(M[:2] @ b) + abs(M[2] @ b)
+                continue
+            added = there.value(np.append(TARGET, b)) - here.value(TARGET)
+            assert moved == pytest.approx(added, rel=1e-3, abs=2e-5), (terms[j], here.name)
+
+
+def test_the_displacement_of_a_velocity_is_the_rate_of_that_of_the_place():
+    motion = Considered(inner=INNER, terms=ALL)
+    seen = ConsideredRadar(radar=RADAR, cov=np.eye(len(ALL)))
+    ahead, behind = (seen.displaced(INNER.move(TARGET, dt), motion)[:3] for dt in (0.1, -0.1))
+    found = seen.displaced(TARGET, motion)
+    np.testing.assert_allclose(found[3:6], (ahead - behind) / 0.2, rtol=1e-6, atol=1e-9)
+    assert not found[6].any()
+
+
+def test_overhead_a_displacement_is_finite():
+    motion = Considered(inner=INNER, terms=ALL)
+    seen = ConsideredRadar(radar=RADAR, cov=np.eye(len(ALL)))
+    above = np.array([0.0, 0.0, 9e3, 150.0, 0.0, 0.0, 0.0])
+    assert np.isfinite(seen.displaced(above, motion)).all()
 
 
 @pytest.mark.parametrize(

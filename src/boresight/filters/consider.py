@@ -10,18 +10,21 @@ covariance of the innovation, Joseph's form with the gain (Kx, 0) gives
 
     Pxx+ = Pxx - Kx S Kx',    Pxb+ = Pxb - Kx S Kb',    Pbb+ = Pbb,
 
-the first two being those of the optimal filter. So any filter that updates a Gaussian becomes a
+the first two being those of the optimal filter. So any filter that keeps a Gaussian becomes a
 consider filter: let it update target and errors by a whole plot, and put back what is known of the
 errors. What is put back exceeds what the optimal filter has by Kb S Kb', so the joint covariance
 stays one.
 
-Differs from them: the errors are put back once a plot, not once a component, so a filter that takes
-one component after the other is that of the whole plot too. A plot sees the errors only through
-what they add to it, e = E b, so the filter updates (x, e), at most three states more than its own
-however many terms there are; with G' = P(x,e)^-1 P(x,e),b the change of Pxb is that of Px,(x,e)
-times G'. Places are kept as of the instant at which they were measured, where a time bias does
-nothing, and told as of the instant that the plot is stamped with. E is taken at the prediction. A
-plot that is turned away or empty changes nothing.
+Differs from them: the target is kept where the radar sees it, y = x + M b, and told where it is. A
+plot is one of y, whatever b is, so the filter updates y alone, with its own formula, and knows of b
+what y tells it: with A = Pyy^-1 Pyb its gain is A' Ky, and A' (Pyy - Pyy+) A is Kb S Kb'. Putting
+b back then leaves x as above. In a linear world this is Schmidt's filter to the last digit. In
+a curved one (x, b) goes wrong where the errors are more uncertain than plots are noisy: Pxb is
+large, of a direction that gradients taken at other places do not quite cancel, and what is left of
+it looks like knowledge. Pyb begins at zero in a track that begins with a plot and stays small.
+
+b is put back once a plot, not once a component, so a filter that takes one component after the
+other is that of the whole plot too. A plot that is turned away or empty changes nothing.
 
 Every track carries the errors on its own. Two tracks of one radar err alike, by their shares of the
 same b; their covariances do not say so.
@@ -29,7 +32,6 @@ same b; their covariances do not say so.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -37,16 +39,14 @@ import numpy as np
 from boresight.errors import UsageError
 from boresight.filters.recursion import Recursion
 from boresight.filters.start import SPEED_MPS
-from boresight.filters.steps import State, Surprise, Updating, gaussian_layout
+from boresight.filters.steps import Method, State, Surprise, gaussian_layout
 from boresight.lanes import Leaf, Matrix
 from boresight.maths import Gaussian, jacobian, mirror, solve
-from boresight.models.considered import Considered, ConsideredRadar, erring
-from boresight.models.systematic import SystematicErrors, effects
+from boresight.models.components import Component
+from boresight.models.considered import TIME, Considered, ConsideredRadar
+from boresight.models.systematic import SystematicErrors
 
 Array = Any
-_HAIR = 1e-10  # of a variance: keeps errors apart that are one and the same, or none
-_STEEPEST = 0.1  # cosine of elevation: overhead, a plot at a given height tells no place
-TIME = "time_bias_s"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,14 +54,14 @@ class Consider:
     """A filter of a motion `Considered` that corrects the target and never the radar's errors.
 
     Attributes:
-        inner: what updates a Gaussian.
+        inner: any filter that keeps a Gaussian in its motion's coordinates.
     """
 
-    inner: Updating
+    inner: Method
 
     @property
     def plain(self) -> bool:
-        """What it keeps is of another instant than what it tells."""
+        """It keeps the target where the radar sees it."""
         return False
 
     def start(
@@ -77,103 +77,85 @@ class Consider:
         return with_errors(begun, motion, sensor)
 
     def layout(self, motion: Considered, sensor: ConsideredRadar) -> dict[str, Leaf]:
-        """The target when it was measured, and its covariance with the errors."""
+        """The target as the radar sees it, and its covariance with the errors."""
         del sensor
         kept = gaussian_layout(motion.inner)
         return kept | {"shared": Matrix(motion.own, len(motion.terms))}
 
     def begin(self, start: Gaussian, motion: Considered, sensor: ConsideredRadar) -> State:
-        """Target and errors, as of the instant of measurement."""
-        del sensor
-        own, (mean, cov) = motion.own, _later(start, motion, -1.0)
-        return {"mean": mean[:own], "cov": cov[:own, :own], "shared": cov[:own, own:]}
+        """From target and errors."""
+        own, M = motion.own, sensor.displaced(start.mean[: motion.own], motion)
+        cov = _moved(start.cov, M)
+        return {"mean": start.mean[:own], "cov": cov[:own, :own], "shared": cov[:own, own:]}
 
     def predict(self, state: State, motion: Considered, sensor: ConsideredRadar, dt: Any) -> State:
-        """The target by the inner filter; the errors stay."""
-        del sensor
-        moved = self.inner.moved(Gaussian(state["mean"], state["cov"]), motion.inner, dt)
+        """By the inner filter, and by what bends the path that the radar sees; the errors stay."""
+        kept = {"mean": state["mean"], "cov": state["cov"]}
+        moved = self.inner.predict(kept, motion.inner, sensor.radar, dt)
         _, F = jacobian(lambda x: motion.inner.move(x, dt), state["mean"])
-        return moved._asdict() | {"shared": F @ state["shared"]}
+        before, after = (sensor.displaced(s["mean"], motion) for s in (state, moved))
+        G, shared = after - F @ before, F @ state["shared"]
+        bent = G @ mirror(sensor.cov)
+        cross = (shared + bent * 0.5) @ G.T
+        cov = mirror(moved["cov"] + cross + cross.T)
+        return {"mean": moved["mean"], "cov": cov, "shared": shared + bent}
 
     def update(
         self, state: State, z: Array, motion: Considered, sensor: ConsideredRadar
     ) -> tuple[State, Surprise]:
-        """By the inner filter, of the target and of what the errors add to this plot."""
-        own, (mean, cov) = motion.own, _joint(state, sensor)
-        z, clean = sensor.radar.independent(z, motion.inner)
-        parts = list(clean)
-        touched = sensor.touched([term for term in motion.terms if term != TIME])
-        A = _seen(sensor.design(mean[:own], motion, touched), motion)
-        for at, i in enumerate(touched, start=own):
-            parts[i] = erring(parts[i], own, itemgetter(at))
-        prior = Gaussian(A @ mean, _apart(A @ cov @ A.T, own, [parts[i].sigma for i in touched]))
-        post = self.inner.formula(prior, z, parts, **dict(self.inner.settings))
-        lost = (prior.cov - post.cov)[:own]
+        """By the inner filter; what that told of the errors is put back."""
+        mean, cov, shared = state["mean"], state["cov"], state["shared"]
+        kept = {"mean": mean, "cov": cov}
+        post, surprise = self.inner.update(kept, z, motion.inner, sensor.radar)
+        M, A = sensor.displaced(mean, motion), solve(cov, shared)
+        lost = (cov - post["cov"]) @ A
+        taken = M @ mirror(A.T @ lost)
         return {
-            "mean": post.mean[:own],
-            "cov": post.cov[:own, :own],
-            "shared": state["shared"] - lost @ solve(prior.cov, A @ cov[:, own:]),
-        }, Surprise(*post[2:])
+            "mean": post["mean"] - M @ (A.T @ (post["mean"] - mean)),
+            "cov": mirror(post["cov"] + taken @ M.T),
+            "shared": shared - lost + taken,
+        }, surprise
+
+    def seen(
+        self, state: State, motion: Considered, sensor: ConsideredRadar
+    ) -> tuple[Gaussian, Sequence[Component]]:
+        """Plots are of the target where the radar sees it."""
+        return Gaussian(state["mean"], state["cov"]), sensor.radar.components(motion.inner)
 
     def output(self, state: State, motion: Considered, sensor: ConsideredRadar) -> Gaussian:
-        """Target and errors, as of the instant that the plot is stamped with."""
-        mean, cov = _later(_joint(state, sensor), motion, 1.0)
+        """Target and errors; the errors' mean is zero, since plots come without it."""
+        shared, own, errors = state["shared"], motion.own, mirror(sensor.cov)
+        joint = np.block([[state["cov"], shared], [shared.T, errors]])
+        cov = np.array(_moved(joint, -sensor.displaced(state["mean"], motion)))
         if TIME in motion.terms:
             # A speed and a time bias that are both uncertain: the variance of their product.
-            at, v = motion.names.index(TIME), slice(motion.dims, 2 * motion.dims)
-            cov = np.array(cov)
+            at, v = own + motion.terms.index(TIME), slice(motion.dims, 2 * motion.dims)
             cov[: motion.dims, : motion.dims] += cov[v, v] * cov[at, at]
-        return Gaussian(mean, cov)
+        return Gaussian(np.concatenate([state["mean"], np.zeros(len(errors))]), cov)
 
 
-def _joint(state: State, sensor: ConsideredRadar) -> Gaussian:
-    """Target and errors; the errors' mean is zero, since plots come without it."""
-    mean, cov, shared = state["mean"], state["cov"], state["shared"]
-    errors = mirror(sensor.cov)
-    mean = np.concatenate([mean, np.zeros(len(errors))])
-    return Gaussian(mean, np.block([[cov, shared], [shared.T, errors]]))
-
-
-def _seen(E: Array, motion: Considered) -> Array:
-    """From target and errors to target and what the errors add to a plot, but for their time."""
-    own, (rows, m) = motion.own, E.shape
-    timely = np.diag([0.0 if term == TIME else 1.0 for term in motion.terms])
-    return np.block([[np.eye(own), np.zeros((own, m))], [np.zeros((rows, own)), E @ timely]])
-
-
-def _apart(cov: Array, own: int, sigmas: Sequence[Any]) -> Array:
-    """A covariance whose last elements are never one and the same, nor nothing."""
-    cov = np.array(mirror(cov))
-    for i, sigma in enumerate(sigmas, start=own):
-        cov[i, i] = cov[i, i] + _HAIR * (cov[i, i] + sigma * sigma)
-    return cov
-
-
-def _later(state: Gaussian, motion: Considered, sign: float) -> Gaussian:
-    """The target moved on by its time bias, or back: what is stamped t was measured before."""
-    if TIME not in motion.terms:
-        return state
-    v, rest = state.mean[motion.dims : 2 * motion.dims], np.zeros(len(motion.names) - motion.dims)
-    late = np.array([float(name == TIME) for name in motion.names])
-    T = np.eye(len(motion.names)) + np.outer(np.concatenate([sign * v, rest]), late)
-    return Gaussian(state.mean, mirror(T @ state.cov @ T.T))
+def _moved(cov: Array, M: Array) -> Array:
+    """The joint covariance of x + M b and b, from that of x and b."""
+    own, m = M.shape
+    T = np.block([[np.eye(own), M], [np.zeros((m, own)), np.eye(m)]])
+    return mirror(T @ cov @ T.T)
 
 
 def consider(recursion: Recursion, errors: SystematicErrors) -> Recursion:
     """The same filter, considering the uncertainty of a radar's systematic errors.
 
     Args:
-        recursion: of a filter that updates a Gaussian in the motion's coordinates.
+        recursion: of a filter that keeps a Gaussian in the motion's coordinates.
         errors: of the radar; their estimate has been taken out of the plots.
 
     Raises:
-        UsageError: the filter keeps something else, or converts plots.
+        UsageError: the filter keeps something else.
     """
-    if not isinstance(recursion.method, Updating):
+    if not recursion.method.plain:
         raise UsageError(
             "this filter cannot carry the uncertainty of systematic errors",
-            why="it makes positions of plots, or keeps another state than the motion's",
-            next_step="use ekf, mekf, ukf, ckf or iplf",
+            why="it keeps another state than a Gaussian in the motion's coordinates",
+            next_step="use ekf or mekf",
         )
     return replace(
         recursion,
@@ -195,40 +177,10 @@ def with_errors(start: Gaussian, motion: Considered, sensor: ConsideredRadar) ->
         mean (lanes, n + m), cov (lanes, n + m, n + m).
     """
     own, dims, m, lanes = motion.own, motion.dims, len(motion.terms), len(start.mean)
-    A = np.zeros((lanes, own + m, own + m)) + np.eye(own + m)
-    A[:, :dims, own:] = -_displaced(start.mean[:, :dims].T, motion, sensor)
+    p, v = start.mean[:, :dims].T, start.mean[:, dims : 2 * dims].T
+    T = np.zeros((lanes, own + m, own + m)) + np.eye(own + m)
+    T[:, :dims, own:] = -np.moveaxis(sensor.shifts(p, v, motion.terms), -1, 0)
     apart = np.zeros((lanes, own + m, own + m))
     apart[:, :own, :own], apart[:, own:, own:] = start.cov, sensor.cov
     mean = np.concatenate([start.mean, np.zeros((lanes, m))], axis=1)
-    return Gaussian(mean, A @ apart @ A.swapaxes(1, 2))
-
-
-def _displaced(place: Array, motion: Considered, sensor: ConsideredRadar) -> Array:
-    """How far a unit of each term moves what a plot takes for the place: (lanes, dims, m).
-
-    A time bias moves a target whose velocity is unknown by nothing that is known.
-    """
-    p = np.zeros((3, place.shape[1]))
-    p[: motion.dims] = place
-    moves = _moves(p, raised="elevation_rad" in sensor.names)
-    found = np.zeros((p.shape[1], motion.dims, len(motion.terms)))
-    for j, term in enumerate(motion.terms):
-        for channel, effect in effects(term, p, 0.0 * p).items():
-            found[:, :, j] += (moves[channel] * effect)[: motion.dims].T
-    return found
-
-
-def _moves(p: Array, *, raised: bool) -> dict[str, Array]:
-    """How places (3, lanes) move with range, azimuth and elevation, each (3, lanes).
-
-    Where no elevation is measured the height is given, and a range moves the place level.
-    """
-    ground, r = np.hypot(p[0], p[1]), np.sqrt((p * p).sum(axis=0))
-    nothing = np.zeros_like(r)
-    along = np.stack([p[0], p[1], nothing]) / ground
-    across = np.stack([-p[1], p[0], nothing])
-    if raised:
-        upward = -p[2] * along + np.stack([nothing, nothing, ground])
-        return {"range_m": p / r, "azimuth_rad": across, "elevation_rad": upward}
-    outward = along / np.maximum(ground / r, _STEEPEST)
-    return {"range_m": outward, "azimuth_rad": across, "elevation_rad": 0.0 * p}
+    return Gaussian(mean, T @ apart @ T.swapaxes(1, 2))

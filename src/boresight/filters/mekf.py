@@ -49,8 +49,8 @@ def _angles(
     found = []
     for component, measured in zip(components, z, strict=True):
         if component.is_angle:
-            there, nu = innovation(component, measured, component.value(mean))
-            _, h = gradient(component.clean or component.value, mean)
+            predicted, h = gradient(component.value, mean)
+            there, nu = innovation(component, measured, predicted)
             weight = there
             if component.name != "elevation_rad":  # whose gradient is 1 / r: the weight is 1
                 bend = distance * distance * (h @ h)

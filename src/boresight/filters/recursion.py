@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from boresight.errors import Status, UsageError
-from boresight.filters.steps import Method
+from boresight.filters.steps import Method, judged
 from boresight.lanes import (
     Kernel,
     Leaf,
@@ -128,9 +128,9 @@ class Recursion:
         prior = self.method.predict(state, motion, sensor, inputs["dt"])
         z, inside = inputs["z"], 1.0
         if self.guard:
-            known = self.method.output(prior, motion, sensor)
             guard = with_numbers(self.guard, "guard", dict(inputs))
-            z, inside = guard.admit(known, z, sensor.components(motion))
+            known, components = judged(self.method, prior, motion, sensor)
+            z, inside = guard.admit(known, z, components)
         post, surprise = self.method.update(prior, z, motion, sensor)
         told = self.method.output(post, motion, sensor)
         results = surprise._asdict() | {"mean": told.mean, "cov": told.cov, "inside": inside}

@@ -5,15 +5,16 @@ update formula. A filter that keeps something else (another frame, several Gauss
 before) is a `Method` of its own; what it tells is always a Gaussian in the motion's coordinates.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from boresight.filters import kalman
 from boresight.filters.posterior import Posterior
 from boresight.filters.start import SPEED_MPS, one_plot
 from boresight.lanes import Leaf, Symmetric, Vector
 from boresight.maths import Gaussian
+from boresight.models.components import Component
 from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
 
@@ -64,10 +65,29 @@ class Method(Protocol):
         """What is told: mean (n,) and cov (n, n) in the motion's coordinates."""
 
 
+@runtime_checkable
+class Seeing(Protocol):
+    """A filter whose plots are of something else than what it tells."""
+
+    def seen(
+        self, state: State, motion: Motion, sensor: Sensor
+    ) -> tuple[Gaussian, Sequence[Component]]:
+        """What its plots are of, and the formulas of what is measured of that."""
+
+
 def gaussian_layout(motion: Motion) -> dict[str, Leaf]:
     """The state of a filter that keeps a Gaussian in the motion's coordinates."""
     n = len(motion.names)
     return {"mean": Vector(n), "cov": Symmetric(n)}
+
+
+def judged(
+    method: Method, state: State, motion: Motion, sensor: Sensor
+) -> tuple[Gaussian, Sequence[Component]]:
+    """What a gate holds plots against: what is told, unless the filter says what plots are of."""
+    if isinstance(method, Seeing):
+        return method.seen(state, motion, sensor)
+    return method.output(state, motion, sensor), sensor.components(motion)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,14 +64,11 @@ class Component:
             `range_rate_mps`, or a coordinate.
         value: formula of the state (n,).
         sigma: standard deviation, in the unit of the name.
-        clean: the value without the sensor's systematic errors, where `value` has states for them:
-            what depends on geometry alone, such as curvature, is taken from this.
     """
 
     name: str
     value: Callable[[Array], Any]
     sigma: Any
-    clean: Callable[[Array], Any] | None = None
 
     @property
     def is_angle(self) -> bool:

@@ -9,19 +9,22 @@ Heights and range rates are taken as they are: a time bias moves them by the cli
 acceleration of the target, which is less than they err by.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from boresight.errors import UsageError, unknown
+from boresight.maths import jacobian, select
 from boresight.models.components import Component
 from boresight.models.motion import Motion
 from boresight.models.sensors import Radar
 from boresight.models.systematic import TERMS, effects
 
 Array = Any
+TIME = "time_bias_s"
+_FLOOR = 1e-6  # m²: no target is nearer to the vertical axis
+_STEEPEST = 0.1  # cosine of elevation: overhead, a plot at a given height tells no place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,39 +103,59 @@ class ConsideredRadar:
         """Those of the radar."""
         return self.radar.names
 
-    def touched(self, terms: Sequence[str]) -> tuple[int, ...]:
-        """Places in a plot of the components that any of these terms can change."""
-        channels = {name for term in terms for name in effects(term, np.ones(3), np.ones(3))}
-        return tuple(i for i, name in enumerate(self.names) if name in channels)
-
-    def design(self, state: Array, motion: Considered, touched: Sequence[int]) -> Array:
-        """What one unit of each term adds to components of a plot.
-
-        Args:
-            state: (n,) the target's own.
-            motion: its motion, with the terms.
-            touched: places of the components in a plot.
-
-        Returns:
-            (touched, m), m or rad for a unit of the term.
-        """
-        place, speed = (_in_space(a) for a in self.radar.relative(state, motion.dims))
-        added = [effects(term, place, speed) for term in motion.terms]
-        rows = [[each.get(self.names[i], 0.0) for each in added] for i in touched]
-        return np.array(rows).reshape(len(touched), len(added))
-
     def components(self, motion: Motion) -> tuple[Component, ...]:
         """The radar's formulas, each with what the errors add to it."""
         if not isinstance(motion, Considered):
             raise UsageError("a radar whose errors are considered needs a motion that has them")
-        own, parts = motion.own, list(self.radar.components(motion.inner))
-        for i in self.touched(motion.terms):
-            parts[i] = erring(parts[i], own, self._added(i, motion))
-        return tuple(parts)
+        return tuple(self._erring(part, motion) for part in self.radar.components(motion.inner))
 
-    def _added(self, i: int, motion: Considered) -> Callable[[Array], Any]:
+    def _erring(self, part: Component, motion: Considered) -> Component:
         own = motion.own
-        return lambda state: self.design(state[:own], motion, [i])[0] @ state[own:]
+
+        def value(state: Array) -> Any:
+            p, v = (_in_space(a) for a in self.radar.relative(state[:own], motion.dims))
+            total = part.value(state[:own])
+            for term, error in zip(motion.terms, state[own:], strict=True):
+                total = total + effects(term, p, v).get(part.name, 0.0) * error
+            return total
+
+        return Component(part.name, value, part.sigma)
+
+    def displaced(self, state: Array, motion: Considered) -> Array:
+        """How far from its target a radar sees it for one unit of each term.
+
+        Args:
+            state: (n,) the target's own.
+            motion: its motion, with the terms.
+
+        Returns:
+            (n, m): of positions, m, of velocities, m/s, and nothing of further states.
+        """
+        dims, m = motion.dims, len(motion.terms)
+        p, v = self.radar.relative(state, dims)
+
+        def seen(later: Array) -> Array:
+            return np.array(self.shifts(p + v * later[0], v, motion.terms)).reshape(-1)
+
+        there, rates = jacobian(seen, 0.0 * p[:1])
+        moved = [part.reshape(dims, m) for part in (there, rates[:, 0])]
+        return np.concatenate([*moved, np.zeros((motion.own - 2 * dims, m))])
+
+    def shifts(self, p: Array, v: Array, terms: tuple[str, ...]) -> Array:
+        """How far one unit of each term moves what a plot takes for the place p, (dims, m).
+
+        A time bias moves it back along the velocity v. Where no elevation is measured the height is
+        given, and the rest moves it level; the Earth's curve would take a hundredth of that at most
+        in height. Runs on lanes too: (dims, lanes) to (dims, m, lanes).
+        """
+        place = _in_space(p)
+        moves = _moves(place, raised="elevation_rad" in self.names)
+        columns = []
+        for term in terms:
+            effect = effects(term, place, 0.0 * place)
+            moved = sum(moves[channel] * effect[channel] for channel in moves if channel in effect)
+            columns.append(-v if term == TIME else moved[: len(p)])
+        return np.stack(columns, axis=1)
 
     def independent(self, z: Array, motion: Motion) -> tuple[Array, tuple[Component, ...]]:
         """As they are: their noises are independent."""
@@ -143,19 +166,19 @@ class ConsideredRadar:
         return normals
 
 
-def erring(part: Component, own: int, added: Callable[[Array], Any]) -> Component:
-    """A component of a target's own states, with what errors add to it.
-
-    Args:
-        part: formula of the first `own` states.
-        own: how many states are the target's.
-        added: formula of all states.
-    """
-
-    def clean(state: Array) -> Any:
-        return part.value(state[:own])
-
-    return Component(part.name, lambda state: clean(state) + added(state), part.sigma, clean)
+def _moves(p: Array, *, raised: bool) -> dict[str, Array]:
+    """How a place (3,) moves with range, azimuth and, where it is measured, elevation."""
+    ground2 = p[0] * p[0] + p[1] * p[1]
+    ground = np.sqrt(select(ground2 < _FLOOR, _FLOOR, ground2))
+    r, nothing = np.sqrt(ground * ground + p[2] * p[2]), 0.0 * ground
+    along = np.array([p[0] / ground, p[1] / ground, nothing])
+    across = np.array([-p[1], p[0], nothing])
+    if raised:
+        upward = np.array([-p[2] * along[0], -p[2] * along[1], ground])
+        return {"range_m": p / r, "azimuth_rad": across, "elevation_rad": upward}
+    level = ground / r
+    outward = along / select(level < _STEEPEST, _STEEPEST, level)
+    return {"range_m": outward, "azimuth_rad": across}
 
 
 def _in_space(place: Array) -> Array:
