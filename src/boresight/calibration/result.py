@@ -101,7 +101,8 @@ class Calibration:
         air_gain_m_per_km: what the delay of a standard atmosphere would look like as a gain.
         residuals: one row for each pair, before and after; see `calibration.residuals`.
         tables: further tables by name: `noise_by_...`, `detection_by_...`, `false_by_...` (range,
-            azimuth), `sectors`, `over_time`, `drift`, `steps`; see `residuals`, `detection`, `false_plots`, `stability`.
+            azimuth), `sectors`, `over_time`, `drift`, `steps`; see `residuals`, `detection`,
+            `false_plots`, `stability`.
         settings: how it was made.
         remarks: sentences for the reader.
     """
