@@ -19,6 +19,7 @@ SCRIPTS: dict[str, tuple[str, ...]] = {  # packages without which there is nothi
     "filters": (),
     "accuracy": (),
     "peers": ("filterpy", "stonesoup", "dynamax", "nrl-tracker"),
+    "registration": (),
     "startup": (),
     "commands": ("pytest",),  # whose tests hold the bad files
     "asterix": ("aviconv-asterix", "libasterix"),

@@ -20,6 +20,7 @@ _WORTH = 30.0  # independent pairs that a target is worth at most
 _SHRUNK = 25.0  # prior variance over posterior: told if the plots shrink the sd to a fifth
 _BELIEVED = 0.5  # of a term's variance: if more is believed than measured, it is not observed
 _COST = 3.0  # of a term's sd, the others being unknown: hardly separable from there on
+_COST_RANGING = 4.5  # a gain costs a bias 3.0 even where targets are spread evenly over the area
 _COMPANY = 0.55  # of a term's largest correlation: others below it are not named with it
 _RANGING = {"range_bias_m", "range_gain_m_per_km"}
 _PART = 0.15  # of a direction's largest weight: terms below it are not named
@@ -82,7 +83,8 @@ def _hardly(
     cost = np.sqrt(np.diag(np.linalg.inv(correlation)))
     found: list[Direction] = []
     for i in np.argsort(-cost, kind="stable"):
-        if cost[i] < _COST or not observable[i]:
+        limit = _COST_RANGING if terms[i] in _RANGING else _COST
+        if cost[i] < limit or not observable[i]:
             continue
         size = np.where(observable, np.abs(correlation[i]), 0.0)
         size[i] = 0.0
