@@ -50,7 +50,8 @@ def false_tables(pairing: Pairing, plots: "pl.DataFrame") -> "dict[str, pl.DataF
     kinds = _kinds(pairing, plots)
     time, range_m = plots["time_s"].to_numpy(), plots["range_m"].to_numpy()
     azimuth = plots["azimuth_deg"].to_numpy() % 360.0
-    first, last = pairing.due["time_s"].min(), pairing.due["time_s"].max()
+    due = pairing.due["time_s"].to_numpy()
+    first, last = float(due.min()), float(due.max())
     here = np.any(list(kinds.values()), axis=0) & np.isfinite(range_m + azimuth)
     here &= (time >= first) & (time <= last)
     if not here.any():
