@@ -17,11 +17,14 @@ class TrackingResult:
             `east_mps`, `north_mps`, `up_mps` (ENU at the site), `cov_I_J` for I <= J < 6 (upper
             triangle of the ENU state's covariance), `nis`, `dof`, `status` (`started`,
             `updated`, `rejected`, `restarted`), `address`, `mode_a`, `aircraft_id`, `sensor`.
+            Times and covariance are those after a calibration: without the time bias, and with
+            what is uncertain of the radar's errors, which neighbouring tracks share.
         residuals: one row per track and plot: `track`, `time_s`, `sensor`, `range_m`,
             `azimuth_deg`, `range_residual_m`, `range_sd_m`, `azimuth_residual_deg`,
             `azimuth_sd_deg`, `height_residual_m`, `height_sd_m`, `nis`, `dof`, `straight`
             (downlinked roll below 2 degrees around it; null where no roll is known), `used`.
-            A residual is measured minus predicted; its sd is the filter's own.
+            A residual is measured minus predicted; its sd is the filter's own. Plots are as they
+            were filtered: without the air's delay, and corrected where a calibration was given.
         targets: one row per track, worst first: `track`, `address`, `mode_a`, `aircraft_id`,
             `first_s`, `last_s`, `plots`, `used`, `rejected`, `restarts`, `nis_per_dof`,
             `nis_low`, `nis_high` (95 % chi-square band of that mean), `verdict`, `fixed`,
@@ -34,7 +37,8 @@ class TrackingResult:
         nis: `all`, `straight`, `straight_first_half`, `straight_second_half`, from the ninth plot
             after each start: each {`mean`, `median`, `dof`, `scans`}
             of the normalised innovation squared per degree of freedom.
-        settings: site, sensor, atmosphere, noise and process noise with how they were chosen.
+        settings: site, sensor, atmosphere, noise and process noise with how they were chosen, and
+            `errors`: what a calibration took out, {`estimate`, `sd`, `carried`} by term, or None.
         filters: one row per filter, side by side; the first is the one whose tracks these are.
         scores: one row per filter and plot it was scored on: `filter`, `track`, `time_s`, `nis`,
             `dof`, `loglik`, `gain` (its log-likelihood minus the first filter's; null where that
