@@ -47,6 +47,8 @@ def false_tables(pairing: Pairing, plots: "pl.DataFrame") -> "dict[str, pl.DataF
     """
     import polars as pl
 
+    if pairing.due.is_empty():
+        return {}
     kinds = _kinds(pairing, plots)
     time, range_m = plots["time_s"].to_numpy(), plots["range_m"].to_numpy()
     azimuth = plots["azimuth_deg"].to_numpy() % 360.0
