@@ -310,7 +310,7 @@ def test_its_covariance_is_right_where_the_plain_filters_is_far_too_small(name):
 
 
 def test_a_bias_of_range_that_bends_a_passing_path_is_carried_too():
-    # A straight flight past a radar that is 120 m off in range seems to turn: up to 5 mm/s² at 40 km.
+    # Flying straight past a radar that is 120 m off in range seems a turn: 5 mm/s² at 40 km.
     # 400 flights: NEES as above, four scans within 4.5 sd; that of a filter that takes seen paths
     # for straight is beyond 10 at the last.
     C = np.array([[120.0**2]])

@@ -10,8 +10,9 @@ covariance of every track (`filters.consider`). Each track carries that alone: t
 err alike by it, so a difference of two tracks errs by less than their covariances add up to.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -91,15 +92,9 @@ def track(
     if noise is None:
         say(1, stages)
         noise, how = _find_noise(case, filter, place, sensor_noise)
-    flown: list[Flown] = []
-    for done, each in enumerate((filter, *compare)):
-        say(2 + done, stages)
-        try:
-            flown.append(_fly(case, each, noise, place, left, remarks))
-        except UsageError as error:
-            if not (flown and leave_out):
-                raise
-            remarks.append(f"{each.name} is not compared: {error.what}.")
+    one = partial(_fly, case, noise=noise, place=place, left=left, remarks=remarks)
+    watched = _watched((filter, *compare), lambda done: say(2 + done, stages))
+    flown = _in_turn(watched, one, remarks, leave_out=leave_out)
     settings = _settings(case, site, noise, how) | {"atmosphere": _air(atmosphere)}
     settings["errors"] = applied(errors, left) if errors and left else None
     result = _result(case, flown[0], site, settings, remarks)
@@ -107,9 +102,36 @@ def track(
     return replace(result, filters=rows, scores=scores if len(flown) > 1 else None)
 
 
+def _watched(filters: Sequence[Filter], say: Callable[[int], None]) -> Iterator[Filter]:
+    """The filters, each announced with how many came before it."""
+    for done, each in enumerate(filters):
+        say(done)
+        yield each
+
+
+def _in_turn(
+    filters: Iterable[Filter],
+    one: Callable[[Filter], Flown],
+    remarks: list[str],
+    *,
+    leave_out: bool,
+) -> list[Flown]:
+    """Every filter's pass; of those after the first, one that cannot take the plots is remarked."""
+    flown: list[Flown] = []
+    for each in filters:
+        try:
+            flown.append(one(each))
+        except UsageError as error:
+            if not (flown and leave_out):
+                raise
+            remarks.append(f"{each.name} is not compared: {error.what}.")
+    return flown
+
+
 def _fly(
     case: Case,
     chosen: Filter,
+    *,
     noise: Noise,
     place: Site,
     left: SystematicErrors | None,
