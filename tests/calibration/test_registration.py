@@ -176,4 +176,5 @@ def test_a_fifth_of_wrong_references_costs_little(range_m):
     assert clean.noise.outlier_share < 0.002
     for term in SIX:
         assert found.terms[term].independent_sd < 1.3 * clean.terms[term].independent_sd, term
-        assert abs(found.terms[term].estimate - TRUE[term]) < 4.5 * found.terms[term].sd, term
+        allowed = 3.5 * clean.terms[term].independent_sd  # late references would move the time by 7
+        assert abs(found.terms[term].estimate - TRUE[term]) < allowed, term
