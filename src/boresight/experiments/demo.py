@@ -127,6 +127,7 @@ def _calibrated(recording: Recording, calibration: Calibration, site: Site) -> T
         atmosphere=AIR,
         errors=calibration.errors,
         sensor_noise=(noise.range_m, noise.azimuth_deg),
+        delay_m=noise.target_range_m,
     )
 
 

@@ -59,12 +59,14 @@ def applied(
             f"{chosen or ', '.join(map(str, known))}."
         )
     noise = (found.noise.range_m, found.noise.azimuth_deg)
+    delay = found.noise.target_range_m
     arguments = {
         "site": site or found.site,
         "sensor": chosen,
         "atmosphere": _air(found, atmosphere),
         "errors": found.errors,
         "sensor_noise": noise if all(map(isfinite, noise)) else None,
+        "delay_m": delay if isfinite(delay) else 0.0,
     }
     return Applied(arguments=arguments, remarks=remarks)
 
