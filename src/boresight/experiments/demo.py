@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from boresight.calibration import references
 from boresight.calibration.calibrate import calibrate
@@ -33,9 +33,6 @@ from boresight.models.atmosphere import ExponentialAtmosphere
 from boresight.tracking.noise import Noise
 from boresight.tracking.result import Comparison, TrackingResult
 from boresight.tracking.tracker import track
-
-if TYPE_CHECKING:
-    import polars as pl
 
 FILTERS = ("ekf", "mekf")
 CALIBRATED = f"{FILTERS[-1]}, calibrated"
@@ -94,12 +91,12 @@ def run_demo(progress: Progress | None = None) -> DemoResult:
     results, held = {}, []
     for name in FILTERS:
         say(f"tracking with {name}")
-        results[name] = track(recording.plots, filter=lookup(name), site=site)
-        ns = _ns_per_update(recording.plots, results[name], site)
+        results[name], ns = _tracked(recording, name, site=site)
         held.append(hold(results[name], truth, facts, ns))
     say(f"tracking with {CALIBRATED}")
-    results[CALIBRATED] = _calibrated(recording, calibration, site)
-    corrected = hold(results[CALIBRATED], truth, facts, float("nan")).true
+    using = _using(calibration)
+    results[CALIBRATED], ns = _tracked(recording, FILTERS[-1], site=site, **using)
+    corrected = hold(results[CALIBRATED], truth, facts, ns).true
     false = false_tracks(results[FILTERS[-1]], truth, facts)
     error = plot_error(results[FILTERS[-1]], truth, facts, false)
     true, seen, straight = (list(one) for one in zip(*held, strict=True))
@@ -118,24 +115,24 @@ def run_demo(progress: Progress | None = None) -> DemoResult:
     )
 
 
-def _calibrated(recording: Recording, calibration: Calibration, site: Site) -> TrackingResult:
+def _using(calibration: Calibration) -> dict[str, Any]:
+    """What the tracker takes of a calibration."""
     noise = calibration.noise
-    return track(
-        recording.plots,
-        filter=lookup(FILTERS[-1]),
-        site=site,
-        atmosphere=AIR,
-        errors=calibration.errors,
-        sensor_noise=(noise.range_m, noise.azimuth_deg),
-        delay_m=noise.target_range_m,
-    )
+    return {
+        "atmosphere": AIR,
+        "errors": calibration.errors,
+        "sensor_noise": (noise.range_m, noise.azimuth_deg),
+        "delay_m": noise.target_range_m,
+    }
 
 
-def _ns_per_update(plots: "pl.DataFrame", result: TrackingResult, site: Site) -> float:
-    """Processor time of tracking once more with the noise known: plots in, tables out."""
+def _tracked(recording: Recording, name: str, **given: Any) -> tuple[TrackingResult, float]:
+    """Tracks, and the processor time per update (ns) of tracking once more with the noise known."""
+    chosen = lookup(name)
+    result = track(recording.plots, filter=chosen, **given)
     noise, start = Noise(**result.settings["noise"]), time.process_time_ns()
-    track(plots, filter=lookup(result.filter), site=site, noise=noise)
-    return (time.process_time_ns() - start) / max(result.used, 1)
+    track(recording.plots, filter=chosen, noise=noise, **given)
+    return result, (time.process_time_ns() - start) / max(result.used, 1)
 
 
 def shipped() -> tuple[dict[str, Any], Truth]:
