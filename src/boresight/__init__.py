@@ -41,6 +41,7 @@ _WHERE = {
     "experiments.reproduce": ["reproduce"],
     "interfaces.converting": ["convert"],
     "interfaces.error_models": ["error_model"],
+    "calibration.correcting": ["correct"],
     "interfaces.calibration": ["calibrate", "read_calibration", "write_calibration"],
     "interfaces.reading": ["read"],
     "interfaces.python": ["inspect", "report", "run", "smooth", "stream", "track"],

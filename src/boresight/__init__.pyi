@@ -1,4 +1,5 @@
 # What type checkers and editors see of the lazy __init__; a test keeps the two equal.
+from boresight.calibration.correcting import correct as correct
 from boresight.catalogue import cite as cite
 from boresight.errors import BoresightError as BoresightError
 from boresight.errors import DataError as DataError
