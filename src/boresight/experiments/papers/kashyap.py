@@ -17,7 +17,6 @@ from boresight.experiments.papers import (
     kashyap_figures,
     kashyap_settings,
     kashyap_tables,
-    kashyap_third_rows,
 )
 from boresight.experiments.papers.kashyap_study import Study
 from boresight.experiments.verdicts import Claim
@@ -33,10 +32,8 @@ def reproduce(
     found = [
         *kashyap_settings.settings(study),
         *kashyap_tables.tables(study),
-        kashyap_third_rows.table(study),
         *kashyap_diagrams.diagrams(study),
         *kashyap_curves.figures(study),
-        *kashyap_third_rows.figures(study),
         *kashyap_settings.metrics(study),
         *kashyap_claims.claims(study),
     ]

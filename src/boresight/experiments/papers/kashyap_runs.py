@@ -12,12 +12,13 @@ import numpy as np
 
 from boresight.experiments.consistency import line_of_sight_axes
 from boresight.experiments.metrics import percent_fit_error, squared_error
-from boresight.experiments.papers.kashyap_methods import Method, polar, track
+from boresight.experiments.papers.kashyap_methods import Method, cmkf_d, ecmkf, polar, track
 from boresight.experiments.scenario import Scenario
 from boresight.experiments.simulate import Plots, Truth, simulate
 from boresight.filters.recursion import Estimate
 from boresight.maths import wrap
 from boresight.maths.seeds import Stream, normals
+from boresight.models.error_model import ErrorModel
 
 Array = Any
 _CHUNK = 250
@@ -173,3 +174,39 @@ def _repeated(estimate: Estimate, truth: Truth, noises: int) -> Repeated:
         rsspe=np.mean(np.sqrt(grouped(squared_error(estimate, truth))), axis=1),
         elevation=np.sqrt(np.mean(np.square(grouped(up)), axis=1)),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noises:
+    """The R that ECMKF and CMKF-D use on the same plots, by method: Figure 6.
+
+    Attributes:
+        mean: averaged over the scans of each run after the window has filled, (runs, d), m².
+        first: of the first run, (scans, d), m².
+        swing: 5 and 95 % quantiles, over runs and scans, of ECMKF's over CMKF-D-T's.
+    """
+
+    mean: dict[str, Array]
+    first: dict[str, Array]
+    swing: tuple[float, float]
+
+
+def noises(world: Scenario, model: ErrorModel, runs: int, seed: int) -> Noises:
+    """Run the preparations of plots, no filters."""
+    methods = {"ecmkf": ecmkf(model)}
+    methods |= {"cmkf-d-t": cmkf_d("cmkf-d-t"), "cmkf-d-m": cmkf_d("cmkf-d-m")}
+    filled = slice(model.window or 0, None)
+    mean: dict[str, list[Array]] = {name: [] for name in methods}
+    first: dict[str, Array] = {}
+    shares = []
+    for truth, plots in chunks(world, runs, seed):
+        found = {}
+        for name, method in methods.items():
+            sensor: Any = method(world, truth, plots).sensor
+            found[name] = np.diagonal(sensor.cov, axis1=-2, axis2=-1)
+            mean[name].append(np.mean(found[name][:, filled], axis=1))
+            first.setdefault(name, found[name][0])
+        shares.append((found["ecmkf"] / found["cmkf-d-t"])[:, filled].ravel())
+    low, high = np.quantile(np.concatenate(shares), (0.05, 0.95))
+    joined = {name: np.concatenate(each) for name, each in mean.items()}
+    return Noises(mean=joined, first=first, swing=(float(low), float(high)))

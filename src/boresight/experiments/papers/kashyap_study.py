@@ -9,8 +9,14 @@ from typing import Any
 
 from boresight.experiments.papers.kashyap_leak import Ratio, over_bound
 from boresight.experiments.papers.kashyap_methods import Method, cmkf_d, ecmkf, emekf, plain
-from boresight.experiments.papers.kashyap_noise import Noises, noises
-from boresight.experiments.papers.kashyap_runs import Repeated, Tracked, repeated, tracked
+from boresight.experiments.papers.kashyap_runs import (
+    Noises,
+    Repeated,
+    Tracked,
+    noises,
+    repeated,
+    tracked,
+)
 from boresight.experiments.papers.kashyap_third import seen, substitute
 from boresight.experiments.scenario import Scenario, build
 from boresight.experiments.simulate import Truth
@@ -164,6 +170,13 @@ class Study:
         many = max(int(self.assumed["noises_per_truth"]), self.runs // _NOISES_OF)
         methods = self.pair | {name: self.unaided[name] for name in ("emekf, R only", "ekf")}
         return seen(*self.flight, methods, many, self.seed)
+
+    @property
+    def stand_in(self) -> str:
+        """What stands for Set 3, in words."""
+        world, _ = self.flight
+        noises = len(self.third["emekf"].square)
+        return f"in its place: {world.source}, {world.scans} scans, {noises} noises"
 
     @cached_property
     def leak(self) -> dict[str, dict[str, Ratio]]:
