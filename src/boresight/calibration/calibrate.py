@@ -32,6 +32,7 @@ USUAL = (
     "azimuth_sin_deg",
     "time_bias_s",
 )
+_FEWEST = 3  # pairs
 NOT_TRUTH = (
     "The reference is a centre's system tracks, made from radars (perhaps this one among them), "
     "not truth: what all of them share does not show here, and their smoothing does."
@@ -61,7 +62,7 @@ def calibrate(
         gate_m: how far from its plot a target may be where the radar tells no identity.
 
     Raises:
-        DataError: nothing can be paired, or elevation is asked for and not measured.
+        DataError: nothing can be paired, too little for the terms, or elevation is asked for and not measured.
         UsageError: no such sensor.
     """
     remarks: list[str] = []
@@ -69,6 +70,7 @@ def calibrate(
     gate = GATE_M if gate_m is None else gate_m
     pairing = pair(mine, reference, site, gate_m=gate, atmosphere=atmosphere)
     wanted = _terms(terms, pairing.pairs)
+    _check_number(pairing.pairs, wanted, pairing.dropped)
     found = register(pairing.pairs, wanted)
     left = stability(pairing.pairs, found)
     tables = detection_tables(pairing, mine, site)
@@ -118,6 +120,18 @@ def _terms(asked: tuple[str, ...] | None, pairs: Pairs) -> tuple[str, ...]:
             next_step="leave elevation out of --terms",
         )
     return asked
+
+
+def _check_number(pairs: Pairs, terms: tuple[str, ...], dropped: dict[str, int]) -> None:
+    fewest = max(_FEWEST, len(terms))
+    if len(pairs) < fewest:
+        reasons = "; ".join(f"{count} plots: {why}" for why, count in dropped.items())
+        raise DataError(
+            f"{len(pairs)} pairs of plots and reference are too few: {len(terms)} terms need "
+            f"{fewest} at least",
+            why=reasons or "no plot was dropped, so the recording has no more",
+            next_step="record for longer, or name fewer terms",
+        )
 
 
 def _name(plots: "pl.DataFrame") -> str:

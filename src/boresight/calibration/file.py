@@ -6,12 +6,14 @@ residuals are not: they are in the report and in `residuals.parquet` beside it.
 
 import tomllib
 from dataclasses import asdict
+from math import isfinite, isinf, isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from boresight.calibration.result import Calibration, Direction, NoiseFound, TermFound
-from boresight.errors import DataError, MissingInputError, OutputError
+from boresight.errors import DataError, MissingInputError, OutputError, UsageError
 from boresight.maths.frames import Site
+from boresight.models.atmosphere import atmosphere
 from boresight.models.systematic import TERMS, SystematicErrors
 
 if TYPE_CHECKING:
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
 FORMAT, VERSION = "boresight calibration", 1
 _ROUNDING = 1e-9
+_WIDEST_DEG = 180.0
 
 
 def write_calibration(found: Calibration, path: Path) -> Path:
@@ -86,12 +89,14 @@ def read_calibration(path: Path) -> Calibration:
     """
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise MissingInputError(
             f"the calibration {path} cannot be read",
-            why=str(getattr(error, "strerror", None) or error),
+            why=error.strerror or str(error),
             next_step="make one: boresight calibrate FILE --reference adsb -o DIR",
         ) from error
+    except UnicodeDecodeError:
+        raise _no_calibration(path, "it is not text") from None
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -99,7 +104,7 @@ def read_calibration(path: Path) -> Calibration:
     if document.get("format") != FORMAT:
         raise _no_calibration(path, f'it does not say format = "{FORMAT}"')
     if document.get("version") != VERSION:
-        raise _no_calibration(path, f"its version is {document.get('version')}, not {VERSION}")
+        raise _no_calibration(path, f"its version is {document.get('version')!r}, not {VERSION}")
     return _from_document(path, document)
 
 
@@ -116,23 +121,16 @@ def _from_document(path: Path, document: dict[str, Any]) -> Calibration:
 
     try:
         kept = _schema().model_validate(document)
+        errors = _errors(kept)
+        atmosphere(kept.atmosphere)
     except ValidationError as error:
         raise _no_calibration(path, _first(error)) from None
-    import numpy as np
+    except (UsageError, ValueError) as error:
+        raise _no_calibration(path, str(getattr(error, "what", error))) from None
     import polars as pl
 
-    terms = tuple(kept.covariance.terms)
-    estimate = np.array([kept.terms[name].estimate for name in terms])
-    if not np.isfinite(estimate).all():
-        raise _no_calibration(path, "an estimate is not a number")
-    cov = np.array(kept.covariance.rows)
-    if (
-        np.abs(cov - cov.T).max() > _ROUNDING * np.abs(cov).max()
-        or np.linalg.eigvalsh(cov).min() < -_ROUNDING * np.abs(cov).max()
-    ):
-        raise _no_calibration(path, "covariance.rows is not the covariance of covariance.terms")
     return Calibration(
-        errors=SystematicErrors(terms=terms, estimate=estimate, cov=cov),
+        errors=errors,
         terms=kept.terms,
         directions=tuple(kept.directions),
         noise=kept.noise,
@@ -140,6 +138,20 @@ def _from_document(path: Path, document: dict[str, Any]) -> Calibration:
         site=kept.site,
         **kept.model_dump(include=_PLAIN),
     )
+
+
+def _errors(kept: Any) -> SystematicErrors:
+    """Estimates with their joint covariance; ValueError where it is none."""
+    import numpy as np
+
+    terms = tuple(kept.covariance.terms)
+    cov = np.array(kept.covariance.rows)
+    sd = np.sqrt(np.maximum(np.diag(cov), 0.0))
+    alike = cov / np.outer(*[np.where(sd > 0, sd, 1.0)] * 2)  # one scale for metres and degrees
+    if np.abs(alike - alike.T).max() > _ROUNDING or np.linalg.eigvalsh(alike).min() < -_ROUNDING:
+        raise ValueError("covariance.rows is not the covariance of covariance.terms")
+    estimate = np.array([kept.terms[name].estimate for name in terms])
+    return SystematicErrors(terms=terms, estimate=estimate, cov=cov)
 
 
 _PLAIN = {
@@ -158,14 +170,16 @@ _PLAIN = {
 def _first(error: "ValidationError") -> str:
     """The first fault of a file, with its place."""
     fault = error.errors()[0]
-    return f"{'.'.join(str(part) for part in fault['loc'])}: {fault['msg']}"
+    said = fault["msg"].removeprefix("Value error, ")
+    return ": ".join(part for part in (".".join(map(str, fault["loc"])), said) if part)
 
 
 def _schema() -> Any:
     """What a file must hold; built when one is read, since pydantic takes long to import."""
-    from pydantic import BaseModel, ConfigDict, Field, model_validator
+    from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
     Finite = Annotated[float, Field(allow_inf_nan=False)]
+    Count = Annotated[int, Field(ge=0)]
 
     class Covariance(BaseModel):
         terms: list[str]
@@ -177,12 +191,12 @@ def _schema() -> Any:
         sensor: str
         reference: str
         atmosphere: str
-        pairs: int
-        targets: int
+        pairs: Count
+        targets: Count
         air_gain_m_per_km: float
-        terms: dict[str, TermFound]
+        terms: dict[str, Annotated[TermFound, AfterValidator(_possible_term)]]
         covariance: Covariance
-        noise: NoiseFound
+        noise: Annotated[NoiseFound, AfterValidator(_possible_noise)]
         directions: list[Direction] = []
         dropped: dict[str, int] = {}
         settings: dict[str, Any] = {}
@@ -190,13 +204,41 @@ def _schema() -> Any:
         site: Site | None = None
 
         @model_validator(mode="after")
-        def _terms_are_known(self) -> "Document":
-            lost = [n for n in self.covariance.terms if n not in self.terms or n not in TERMS]
-            if lost:
-                raise ValueError(f"covariance.terms names {lost[0]}, which is not among the terms")
+        def _terms_are_those_of_the_covariance(self) -> "Document":
+            strange = [name for name in self.terms if name not in TERMS]
+            if strange:
+                raise ValueError(f"there is no term {strange[0]}")
+            names = self.covariance.terms
+            if not names or sorted(names) != sorted(self.terms):
+                raise ValueError(
+                    f"covariance.terms names {', '.join(names) or 'nothing'}, and the terms are "
+                    f"{', '.join(self.terms) or 'none'}"
+                )
             lengths = {len(self.covariance.rows), *map(len, self.covariance.rows)}
-            if lengths != {len(self.covariance.terms)}:
+            if lengths != {len(names)}:
                 raise ValueError("covariance.rows is no square of the size of covariance.terms")
             return self
 
     return Document
+
+
+def _possible_term(term: TermFound) -> TermFound:
+    if not isfinite(term.estimate):
+        raise ValueError("the estimate is not a number")
+    if not (term.sd >= 0 and term.independent_sd >= 0):
+        raise ValueError("a standard deviation is negative or not a number")
+    return term
+
+
+def _possible_noise(noise: NoiseFound) -> NoiseFound:
+    """NaN is noise that is not known; none is negative, and none of a measured channel is zero."""
+    for name in ("range_m", "azimuth_deg"):
+        if getattr(noise, name) <= 0 or isinf(getattr(noise, name)):
+            raise ValueError(f"{name} is {getattr(noise, name)}, no standard deviation")
+    if noise.azimuth_deg > _WIDEST_DEG:
+        raise ValueError(f"azimuth_deg is {noise.azimuth_deg}, more than half a turn")
+    if noise.target_range_m < 0 or isinf(noise.target_range_m):
+        raise ValueError(f"target_range_m is {noise.target_range_m}, no standard deviation")
+    if not (isnan(noise.outlier_share) or 0 <= noise.outlier_share <= 1):
+        raise ValueError(f"outlier_share is {noise.outlier_share}, not between 0 and 1")
+    return noise
