@@ -18,11 +18,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import faults
+import faults_calibration
 import faults_filters
 from faults import Fault
 
 ROOT = Path(__file__).resolve().parents[1]
-FAULTS = (*faults.FAULTS, *faults_filters.FAULTS)
+FAULTS = (*faults.FAULTS, *faults_filters.FAULTS, *faults_calibration.FAULTS)
 
 
 def _tests(*names: str) -> tuple[str, ...]:
@@ -63,6 +64,7 @@ JUDGES = {
     "filters/line_of_sight": _tests(
         "laws/test_bent_gaussians", "laws/test_line_of_sight", "laws/test_moving_sensor"
     ),
+    **{prefix: _tests(*names) for prefix, names in faults_calibration.JUDGES.items()},
     "": LAWS,
 }
 WANTED = 0.9
@@ -73,7 +75,7 @@ def caught(fault: Fault) -> bool:
     """Whether the laws fail against a copy of the source with this fault."""
     with tempfile.TemporaryDirectory(prefix="mutant-") as folder:
         copy = Path(folder) / "src"
-        shutil.copytree(ROOT / "src", copy, ignore=shutil.ignore_patterns("__pycache__", "demo"))
+        shutil.copytree(ROOT / "src", copy, ignore=shutil.ignore_patterns("__pycache__"))
         path = copy / "boresight" / fault.file
         text = path.read_text(encoding="utf-8")
         if fault.old not in text:
