@@ -62,7 +62,7 @@ def calibrate(
         gate_m: how far from its plot a target may be where the radar tells no identity.
 
     Raises:
-        DataError: nothing can be paired, too little for the terms, or elevation is asked for and not measured.
+        DataError: nothing can be paired, or too little; or elevation is asked for, not measured.
         UsageError: no such sensor.
     """
     remarks: list[str] = []

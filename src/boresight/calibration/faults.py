@@ -23,17 +23,19 @@ if TYPE_CHECKING:
     import polars as pl
 
 Array = Any
-_HOUR_S = 3_600.0
-_ZONES = 14  # hours that a clock's zone may be off
+_ZONE_S = 1_800.0  # clocks of some countries are half an hour off
+_ZONES = 28  # steps of it that a clock's zone may be off
 _TRIED = 20_000  # plots of a trial
 # What biases leave: a plot further from its target than this, by identity, is not of it.
 _RANGE_M, _RANGE_SHARE, _AZIMUTH_RAD = 2_000.0, 0.02, 0.3
 _MOVING_MPS = 3.0  # a parked target is in its place at any hour
 _FEW = {"identity": 0.5, "position": 0.1}  # share of pairs that must agree
+_HOPELESS = 0.2  # share of pairs by identity that agree: chance alone makes as many
 _ENOUGH, _MORE = 10, 2.0  # agreeing plots that name a fault, and how many times those without it
 _RATIO = 0.1  # heights in feet are 3.28 times those in metres, within this share
 _HIGH_M = 1_000.0  # above it heights and pressure altitudes differ by little of themselves
 _HIGHEST_M = 20_000.0  # most traffic is below
+_QUARTER = 90.0  # degrees
 _FAR_M = 100_000.0  # beyond the furthest plot
 
 
@@ -79,8 +81,8 @@ def explain(
         raise _nothing(plots, reference, setting.how, found)
     if not is_poor or setting.how == "position":
         return []
-    if not agree:
-        raise _far(plots, setting, found)
+    if agree < _HOPELESS * pairs:
+        raise _far(plots, setting, found, agree)
     told = f"Only {agree} of {pairs} plots lie near the target that has their identity"
     return [f"{told}: the others have wrong references, or errors beyond any bias."]
 
@@ -93,8 +95,8 @@ def _raise_recognised(plots: "pl.DataFrame", reference: Reference, setting: Sett
     if scores[best] >= max(_ENOUGH, _MORE * without):
         raise DataError(
             trials[best][0],
-            why=f"with that put right {scores[best]} of the plots tried agree with the reference, "
-            f"as it is {without}",
+            why=f"with that put right, {scores[best]} of the plots tried agree with the reference; "
+            f"as it is, {without}",
             next_step="correct the file or the setting; nothing was changed here",
         )
 
@@ -146,31 +148,39 @@ Trial = tuple[str, "pl.DataFrame", Reference, Setting]
 
 
 def _clocks(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> Iterator[Trial]:
-    """The reference with its clock moved by whole hours."""
+    """The reference with its clock moved by whole and half hours."""
     import polars as pl
 
-    for hours in (h for n in range(1, _ZONES + 1) for h in (n, -n)):
-        seconds = hours * _HOUR_S
+    for steps in (h for n in range(1, _ZONES + 1) for h in (n, -n)):
+        seconds = steps * _ZONE_S
         table = reference.table.with_columns(pl.col("time_s") - seconds)
-        way = "ahead of" if hours > 0 else "behind"
+        way = "ahead of" if steps > 0 else "behind"
         said = f"the reference's clock is {abs(seconds):.0f} s {way} the plots'"
         yield said, plots, replace(reference, table=table), setting
 
 
 def _places(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> Iterator[Trial]:
-    """Latitude and longitude exchanged; ranges and azimuths in another unit."""
+    """Latitude and longitude exchanged, or of the other sign; other units and senses."""
     import polars as pl
 
+    yield from _sites(plots, reference, setting)
+    degrees = reference.table.with_columns(pl.col("latitude_deg", "longitude_deg") * DEGREE)
+    turned = replace(reference, table=degrees.filter(pl.col("latitude_deg").abs() <= _QUARTER))
+    said = "latitude and longitude of the reference are in radians, not in degrees"
+    yield said, plots, turned, setting
     swapped = reference.table.rename(
         {"latitude_deg": "longitude_deg", "longitude_deg": "latitude_deg"}
-    ).filter(pl.col("latitude_deg").abs() <= 90.0)
+    ).filter(pl.col("latitude_deg").abs() <= _QUARTER)
     known = replace(reference, table=swapped)
     yield "latitude and longitude of the reference are exchanged", plots, known, setting
-    site = setting.site
-    if abs(site.longitude_deg) <= 90.0:
-        north, east = site.longitude_deg, site.latitude_deg
-        turned = replace(setting, site=replace(site, latitude_deg=north, longitude_deg=east))
-        yield "latitude and longitude of the site are exchanged", plots, reference, turned
+    senses = [
+        ("the azimuths are counted against the clock", -pl.col("azimuth_deg")),
+        ("the azimuths are counted from east, against the clock", _QUARTER - pl.col("azimuth_deg")),
+        ("the azimuths are counted from east, not from north", _QUARTER + pl.col("azimuth_deg")),
+        ("the azimuths are counted from south, not from north", 180.0 + pl.col("azimuth_deg")),
+    ]
+    for said, azimuth in senses:
+        yield said, plots.with_columns(azimuth_deg=azimuth % 360.0), reference, setting
     units = [
         ("range_m", FOOT_M, "the ranges are in feet, not in metres"),
         ("range_m", 1 / FOOT_M, "the ranges were taken for feet, and are metres"),
@@ -180,6 +190,21 @@ def _places(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> It
     ]
     for name, factor, said in units:
         yield said, plots.with_columns(pl.col(name) * factor), reference, setting
+
+
+def _sites(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> Iterator[Trial]:
+    """The site with latitude and longitude exchanged, or one of them of the other sign."""
+    site = setting.site
+    north, east = site.latitude_deg, site.longitude_deg
+    others = {
+        "latitude and longitude of the site are exchanged": (east, north),
+        "the longitude of the site has the wrong sign (east is positive)": (north, -east),
+        "the latitude of the site has the wrong sign (north is positive)": (-north, east),
+    }
+    for said, (latitude, longitude) in others.items():
+        if abs(latitude) <= _QUARTER:
+            other = replace(site, latitude_deg=latitude, longitude_deg=longitude)
+            yield said, plots, reference, replace(setting, site=other)
 
 
 def _check_heights(plots: "pl.DataFrame", found: Compared) -> None:
@@ -242,14 +267,15 @@ def _nothing(plots: "pl.DataFrame", reference: Reference, how: str, found: Compa
     )
 
 
-def _far(plots: "pl.DataFrame", setting: Setting, found: Compared) -> DataError:
-    """The error for plots that are all somewhere else than the targets of their identity."""
+def _far(plots: "pl.DataFrame", setting: Setting, found: Compared, agree: int) -> DataError:
+    """The error for plots that are somewhere else than the targets of their identity."""
     off, turned = _off(plots, found)
     return DataError(
-        "no plot is anywhere near the target that has its identity",
+        f"{f'only {agree} of {len(off)} plots are' if agree else 'no plot is'} anywhere near the "
+        "target that has its identity",
         where=f"the median plot is {np.median(off) / 1e3:+.1f} km in range and "
         f"{np.degrees(np.median(turned)):+.1f} degrees in azimuth off",
         why="no bias of a working radar is as large",
         next_step=f"check the site ({setting.site.latitude_deg:g}, {setting.site.longitude_deg:g}),"
-        " north, and that the reference is of this recording",
+        " both clocks, where azimuth is counted from, and that the reference is of this recording",
     )

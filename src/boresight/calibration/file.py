@@ -207,7 +207,7 @@ def _schema() -> Any:
         def _terms_are_those_of_the_covariance(self) -> "Document":
             strange = [name for name in self.terms if name not in TERMS]
             if strange:
-                raise ValueError(f"there is no term {strange[0]}")
+                raise ValueError(f"terms names {strange[0]}, which is none of {', '.join(TERMS)}")
             names = self.covariance.terms
             if not names or sorted(names) != sorted(self.terms):
                 raise ValueError(
