@@ -156,8 +156,14 @@ def test_it_is_cited_as_filters_are(name):
         ({"colour": 1}, "no setting 'colour'"),
         ({"frame": "oblique"}, "frame='oblique' is unknown"),
         ({"drift_m": -1}, "drift_m=-1"),
+        ({"drift_m": None}, "drift_m=None is not a number"),
+        ({"odds": np.inf}, "odds=inf cannot be"),
+        ({"alarm": 0}, "alarm=0.0 would be raised"),
         ({"floor": 2}, "floor=2"),
-        ({"window": 1}, "window=1"),
+        ({"window": 1}, "at least 2"),
+        ({"window": 201}, "at most 200"),
+        ({"window": 10.0}, "window=10.0 is no whole number"),
+        ({"window": True}, "window=True is no whole number"),
         ({"window": 5, "warm_up": 6}, "holds no more"),
         ({"warm_up": 6}, "window=None"),
         ({"noise": "full"}, 'or frame="cartesian"'),
@@ -187,6 +193,119 @@ def test_a_wrong_call_is_named(simulated):
         bs.error_model(plots.z[..., :2], place, PLANE, dt=1.0, frame="cartesian")
     with pytest.raises(UsageError, match="no polar plots"):
         bs.error_model(plots.z[..., :1], place, bs.Radar(range_rate_mps=1.0), dt=1.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"plots": np.zeros((500, 3))}, r"plots have shape \(500, 3\)"),
+        ({"plots": np.zeros((20, 0, 3))}, r"plots have shape \(20, 0, 3\)"),
+        ({"plots": np.full((20, 500, 3), -np.inf)}, "range_m is -inf"),
+        ({"reference": None}, "reference=None is not a number"),
+        ({"reference": np.zeros((500, 3))}, r"the reference has shape \(500, 3\)"),
+        ({"reference": np.zeros((7, 500, 3))}, r"the reference has shape \(7, 500, 3\)"),
+        ({"dt": None}, "the plots carry no dt"),
+        ({"dt": -1.0}, "dt=-1.0 s: time runs forward"),
+        ({"dt": np.nan}, "dt=nan s: time runs forward"),
+        ({"dt": np.ones((20, 4))}, r"dt has shape \(20, 4\)"),
+        ({"drift_m": np.ones(3)}, r"'model.drift_m' has shape \(3,\)"),
+    ],
+)
+def test_arrays_that_cannot_be_are_refused(wrong, sentence, simulated):
+    truth, plots = simulated
+    usual = {"plots": plots.z, "reference": truth.states[..., :3], "radar": RADAR, "dt": 1.0}
+    with pytest.raises(UsageError, match=sentence):
+        bs.error_model(**usual | wrong)
+
+
+@pytest.mark.parametrize("frame", ["polar", "cartesian"])
+def test_a_window_of_equal_differences_is_refused_and_a_floor_helps(frame):
+    """A target that stands still before a radar whose numbers are rounded."""
+    z, place = np.tile([5000.0, 1.0, 0.1], (2, 30, 1)), np.tile([2000.0, 3000.0, 900.0], (1, 30, 1))
+    with pytest.raises(UsageError, match="differences in a window of 10 make no covariance"):
+        bs.error_model(z, place, RADAR, dt=1.0, model="kashyap", frame=frame)
+    found = bs.error_model(z, place, RADAR, dt=1.0, model="kashyap", frame=frame, floor=0.01)
+    nominal = bs.error_model(z, place, RADAR, dt=1.0, frame=frame)
+    np.testing.assert_allclose(found.noise_cov[:, -1], 0.01 * nominal.noise_cov[:, -1], rtol=1e-9)
+
+
+def test_a_full_window_of_too_few_differences_is_refused(simulated):
+    truth, plots = simulated
+    with pytest.raises(UsageError, match="too few for channels that vary together"):
+        bs.error_model(plots, truth, RADAR, frame="cartesian", noise="full", window=3)
+
+
+def test_a_window_longer_than_the_run_leaves_the_noise_as_it_was(simulated):
+    truth, plots = simulated
+    z, place = plots.z[:, :40], truth.states[:, :40, :3]
+    found = bs.error_model(z, place, RADAR, dt=1.0, window=np.int64(41))
+    assert found.sensor.azimuth_deg == pytest.approx(1.5)
+    shorter = bs.error_model(z, place, RADAR, dt=1.0, window=30)
+    assert not np.allclose(shorter.sensor.azimuth_deg[:, -1], 1.5, rtol=0.01)
+
+
+def test_plots_that_came_at_once_are_plots_of_one_error(simulated):
+    """dt = 0: without time to drift, a bias is the mean of all differences."""
+    truth, plots = simulated
+    z, place = plots.z[:, :50], truth.states[:, :50, :3]
+    plain = bs.ErrorModel(odds=None, alarm=None, spread=1e4, correction="same epoch")
+    found = bs.error_model(z, place, RADAR, dt=0.0, model=plain)
+    r = np.linalg.norm(place, axis=-1)
+    np.testing.assert_allclose(found.error[:, -1, 0], (r - z[..., 0]).mean(1), rtol=1e-6)
+    assert np.isfinite(bs.error_model(z, place, RADAR, dt=0.0, model="kashyap").error).all()
+
+
+def test_one_scan_is_corrected_by_its_own_reference_only(simulated):
+    truth, plots = simulated
+    z, place = plots.z[:, :1], truth.states[:, :1, :3]
+    np.testing.assert_array_equal(bs.error_model(z, place, RADAR, dt=1.0).error, 0.0)
+    same = bs.error_model(z, place, RADAR, dt=1.0, model="kashyap")
+    half = (np.linalg.norm(place, axis=-1) - z[..., 0]) / 2  # as sure as a plot, spread 1
+    np.testing.assert_allclose(same.error[..., 0], half, rtol=1e-9)
+
+
+def test_no_runs_are_no_plots():
+    found = bs.error_model(np.zeros((0, 5, 3)), np.zeros((1, 5, 3)), RADAR, dt=1.0)
+    assert found.plots.shape == (0, 5, 3)
+    assert found.error_cov.shape == (0, 5, 3, 3)
+
+
+def test_a_camera_has_angles_only(simulated):
+    truth, plots = simulated
+    camera = bs.Radar(azimuth_deg=1.5, elevation_deg=1.5)
+    found = bs.error_model(plots.z[..., 1:], truth, camera, dt=plots.dt)
+    whole = bs.error_model(plots, truth, RADAR)
+    np.testing.assert_allclose(found.error, whole.error[..., 1:], rtol=1e-9, atol=1e-12)
+    with pytest.raises(UsageError, match="no cartesian plots"):
+        bs.error_model(plots.z[..., 1:], truth, camera, dt=plots.dt, frame="cartesian")
+
+
+def test_a_range_rate_that_goes_with_the_range_stays_as_it_was(simulated):
+    truth, plots = simulated
+    radar = replace(RADAR, range_rate_mps=1.0, range_rate_correlation=0.5)
+    z = np.concatenate([plots.z, np.full((20, 500, 1), 7.0)], axis=-1)
+    found = bs.error_model(z, truth, radar, dt=plots.dt, window=10)
+    assert (found.plots[..., 3] == 7.0).all()
+    assert found.sensor.range_rate_correlation == 0.5
+    assert found.sensor.range_m.shape == (20, 500)
+
+
+def test_a_radar_that_moves_sees_the_reference_from_where_it_was(simulated):
+    truth, plots = simulated
+    path = np.linspace([0.0, 0.0, 0.0], [3000.0, -500.0, 20.0], 500)[None]
+    moving = replace(RADAR, pose=bs.Pose(position_m=path))
+    found = bs.error_model(plots.z, truth.states[..., :3] + path, moving, dt=plots.dt)
+    still = bs.error_model(plots, truth, RADAR)
+    np.testing.assert_allclose(found.error, still.error, rtol=1e-6, atol=1e-9)
+
+
+def test_a_reference_at_the_radar_itself_gives_numbers(simulated):
+    """Its direction means nothing, and must not make a mess."""
+    _, plots = simulated
+    for model in MODELS:
+        found = bs.error_model(plots, np.zeros((1, 500, 3)), RADAR, model=model, reference_m=5.0)
+        assert np.isfinite(found.error).all()
+        assert np.isfinite(found.error_cov).all()
 
 
 def test_every_named_model_runs(simulated):

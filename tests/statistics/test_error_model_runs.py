@@ -87,7 +87,10 @@ def test_a_reference_ten_times_slower_does_no_harm(fast):
     known = np.full(fast.reference.shape, np.nan)
     known[:, ::10] = fast.reference[:, ::10]
     everything = slice(None)
-    assert fast.ratio(fast.corrected(DEFAULT, reference=known), everything) <= 1.02
+    default = fast.ratio(fast.corrected(DEFAULT, reference=known), everything)
+    alone = filtered("mekf", FAST.motion, FAST.sensor, fast.plots)
+    assert default <= 1.02
+    assert default <= 1.01 * fast.ratio(alone, everything)  # the MEKF beats the EKF by 4 % here
     always = replace(DEFAULT, odds=None)
     assert fast.ratio(fast.corrected(always, reference=known), everything) > 1.4
     assert fast.ratio(fast.corrected(KASHYAP, reference=known), everything) > 1.4
@@ -136,10 +139,10 @@ def test_the_told_variance_is_that_of_the_error(set2):
 
 
 def test_a_false_alarm_comes_once_in_thousands_of_references(set2):
-    """Page's sums of standard normals, 0.5 allowed, limit 8: once in 9,900 (Siegmund's formula)."""
+    """Page's sums of standard normals, 0.5 allowed, limit 8: once in 9,480 (Brook and Evans)."""
     z, dt = set2.plots.z, set2.plots.dt
     found = correct(z, set2.reference, dt, SET2.sensor, model=replace(DEFAULT, odds=None))
     share = np.diagonal(found.error_cov, 0, -2, -1) / SIGMA**2
     alarms = np.count_nonzero(share[:, 5:] > 50.0)
-    # 594,000 references; a count of Poisson's kind, mean 60: outside once in 10,000.
-    assert 32 <= alarms <= 94
+    # 594,000 references; a count of Poisson's kind, mean 63: outside once in 10,000.
+    assert 35 <= alarms <= 96

@@ -75,7 +75,8 @@ def correct(
         The plots and the sensor for `mekf` (polar) or `kf` (Cartesian), and what was estimated.
 
     Raises:
-        UsageError: an unknown model, a sensor without the channels, arrays that do not fit.
+        UsageError: an unknown model, a sensor without the channels, arrays that do not fit, a
+            window whose differences make no covariance.
     """
     chosen = lookup(model) if isinstance(model, str) else model
     chosen = chosen if frame is None else replace(chosen, frame=frame)
@@ -113,16 +114,30 @@ def _fitting(z: Array, reference: Array, sensor: Radar) -> tuple[Array, Array]:
 
 def _seen_by(case: Case, noise_cov: Array) -> Radar | CartesianPlots:
     """The sensor of the corrected plots: with the window's noise, where there is a window."""
-    if not case.polar:
-        return CartesianPlots(cov=noise_cov)
-    if not case.model.window:
+    if case.polar and not case.model.window:
         return case.sensor
+    try:
+        if case.polar:
+            return _noisy(case.sensor, case.measured, noise_cov)
+        return CartesianPlots(cov=noise_cov)
+    except UsageError as error:
+        if not case.model.window:
+            raise
+        raise UsageError(
+            f"differences in a window of {case.model.window} make no covariance",
+            why="they do not differ, or they are too few for channels that vary together",
+            next_step="pass floor=0.01, or a longer window and warm_up",
+        ) from error
+
+
+def _noisy(sensor: Radar, measured: tuple[str, ...], noise_cov: Array) -> Radar:
+    """The radar with the standard deviations of every plot."""
     sigma = np.moveaxis(np.sqrt(np.diagonal(noise_cov, 0, -2, -1)), -1, 0)
     fields = {
         name.replace("_rad", "_deg"): np.degrees(s) if name.endswith("_rad") else s
-        for name, s in zip(case.measured, sigma, strict=True)
+        for name, s in zip(measured, sigma, strict=True)
     }
-    return replace(case.sensor, **fields)
+    return replace(sensor, **fields)
 
 
 class _Key:

@@ -1,9 +1,18 @@
 """One scan of the error model for one target: the formula that is recorded.
 
-[page1954] E. S. Page, "Continuous Inspection Schemes". Paper: kashyap (4), (5), (7) and (8), one
-channel at a time.
-Differs from it: a bias may be doubted (`odds`) and may change (`alarm`); both are of
-`models.error_model`.
+Paper: kashyap (4), (5), (7) and (8), one channel at a time.
+Differs from it: a bias may be doubted and may change, by two tests of the innovations.
+
+[wald1945] A. Wald, "Sequential Tests of Statistical Hypotheses": whether there is a bias. Each
+difference multiplies the odds for one by its density with a bias (that of the innovation) over its
+density without (that of the plot's noise alone). Where there is none, the expected factor is 1, so
+the odds ever reach 1 with a probability of at most 1/`odds`.
+
+[page1954] E. S. Page, "Continuous Inspection Schemes": whether it has changed. Two sums of
+normalised innovations, one for each sign, half a standard deviation allowed in each, held at 0 from
+below. Without a change one of them passes `alarm` once in some exp(alarm + 1.17) references; 9,480
+at 8, from the chain of its values. Then the error is as unknown as at first, and odds against a
+bias are even again.
 """
 
 from collections.abc import Mapping, Sequence
