@@ -13,8 +13,8 @@ import numpy as np
 
 from boresight.calibration.comparing import Compared, Setting, compare
 from boresight.calibration.references import Reference
+from boresight.calibration.same_day import overlap, span
 from boresight.errors import DataError
-from boresight.formats.clock import DAY_S
 from boresight.formats.schema import DEGREE, FOOT_M, NAUTICAL_MILE_M
 from boresight.formats.usable import column
 from boresight.maths import wrap
@@ -37,27 +37,6 @@ _HIGH_M = 1_000.0  # above it heights and pressure altitudes differ by little of
 _HIGHEST_M = 20_000.0  # most traffic is below
 _QUARTER = 90.0  # degrees
 _FAR_M = 100_000.0  # beyond the furthest plot
-
-
-def same_day(plots: "pl.DataFrame", reference: Reference) -> tuple[Reference, list[str]]:
-    """The reference on the day of the plots, if either clock counts from a midnight.
-
-    Times of day have no date, and each file's count from its own first midnight.
-    """
-    import polars as pl
-
-    ours, theirs = (_span(table) for table in (plots, reference.table))
-    if not any(-DAY_S < start < 2 * DAY_S for start in (ours[0], theirs[0])):
-        return reference, []
-    middle = np.rint((np.mean(ours) - np.mean(theirs)) / DAY_S)
-    days = min(
-        (middle - 1, middle, middle + 1, 0.0), key=lambda n: (-_overlap(ours, theirs, n), abs(n))
-    )
-    if days == 0:
-        return reference, []
-    table = reference.table.with_columns(pl.col("time_s") + days * DAY_S)
-    said = f"The reference's times were moved by {days:+.0f} days: it counts from another midnight."
-    return replace(reference, table=table), [said]
 
 
 def explain(
@@ -101,18 +80,6 @@ def _raise_recognised(plots: "pl.DataFrame", reference: Reference, setting: Sett
         )
 
 
-def _span(table: "pl.DataFrame") -> tuple[float, float]:
-    time = column(table, "time_s", np.nan)
-    time = time[np.isfinite(time)]
-    return (float(time.min()), float(time.max())) if len(time) else (0.0, 0.0)
-
-
-def _overlap(ours: tuple[float, float], theirs: tuple[float, float], days: float) -> float:
-    """Seconds that both last at once; below zero, what lies between them."""
-    shift = days * DAY_S
-    return min(ours[1], theirs[1] + shift) - max(ours[0], theirs[0] + shift)
-
-
 def _agreeing(plots: "pl.DataFrame", found: Compared, setting: Setting) -> int:
     """Number of plots that are where their target is, as far as any bias lets them be."""
     if setting.how == "position":
@@ -135,7 +102,7 @@ def _score(plots: "pl.DataFrame", reference: Reference, setting: Setting) -> int
     """Number of plots that agree; 0 if those that do are too few of the pairs to mean anything."""
     import polars as pl
 
-    during = pl.col("time_s").is_between(*_span(reference.table))
+    during = pl.col("time_s").is_between(*span(reference.table))
     some = plots.filter(during).head(_TRIED)
     if not some.height:
         return 0
@@ -241,8 +208,8 @@ def _check_heights(plots: "pl.DataFrame", found: Compared) -> None:
 
 def _nothing(plots: "pl.DataFrame", reference: Reference, how: str, found: Compared) -> DataError:
     """The error for plots of which none has a partner: no time, no place, or the reasons."""
-    ours, theirs = _span(plots), _span(reference.table)
-    if _overlap(ours, theirs, 0.0) <= 0:
+    ours, theirs = span(plots), span(reference.table)
+    if overlap(ours, theirs, 0.0) <= 0:
         return DataError(
             "plots and reference do not overlap in time",
             where=f"plots {ours[0]:.1f} to {ours[1]:.1f} s, reference {theirs[0]:.1f} to "

@@ -7,10 +7,11 @@ import numpy as np
 
 from boresight.calibration.comparing import HEIGHTS, Compared, Setting, compare, has_identity
 from boresight.calibration.due import due_scans
-from boresight.calibration.faults import explain, same_day
+from boresight.calibration.faults import explain
 from boresight.calibration.matching import FEWEST_HITS
 from boresight.calibration.pairs import Pairs
 from boresight.calibration.references import Reference
+from boresight.calibration.same_day import same_day
 from boresight.errors import UsageError
 from boresight.formats.usable import column
 from boresight.maths.frames import Site

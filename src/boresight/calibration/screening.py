@@ -148,9 +148,9 @@ def _in_order(table: "pl.DataFrame", remarks: list[str]) -> "pl.DataFrame":
     import polars as pl
 
     step = pl.col("time_s").diff().over("base")
-    wraps = table.select("base", wraps=step < -DAY_S / 2).filter("wraps")["base"]
-    if wraps.len() and wraps.is_unique().all() and (table["time_s"] < DAY_S).all():
-        days = (step < -DAY_S / 2).fill_null(value=False).cum_sum().over("base")
+    start = _start_of_the_day(table)
+    if start is not None:
+        days = (pl.col("time_s") < start).cast(pl.Int64)
         table = table.with_columns(pl.col("time_s") + days * DAY_S)
         remarks.append("The reference's times start again at midnight; they were counted on.")
     back = int((table.select(step).to_series() < 0).sum())
@@ -159,6 +159,28 @@ def _in_order(table: "pl.DataFrame", remarks: list[str]) -> "pl.DataFrame":
             f"{back} rows of the reference go back in time within their target; rows were sorted."
         )
     return table.sort("base", "time_s", maintain_order=True)
+
+
+def _start_of_the_day(table: "pl.DataFrame") -> float | None:
+    """The first time of a table whose times of day start again at midnight, if they do.
+
+    They do if a target's, or all in the file's order, step back by most of a day, once. What begins
+    after midnight steps back nowhere, so the longest pause of the day parts first from last.
+    """
+    import polars as pl
+
+    time = table["time_s"].drop_nans()
+    if not len(time) or float(time.max()) >= DAY_S or float(time.min()) < 0.0:  # type: ignore[arg-type]
+        return None
+    own = pl.col("time_s").diff().over("base") < -DAY_S / 2
+    wraps = table.select("base", wraps=own).filter("wraps")["base"]
+    steps = time.diff().drop_nulls()
+    once = bool((steps < -DAY_S / 2).sum() == 1 and (steps < 0).sum() == 1)
+    if not once and not (wraps.len() and wraps.is_unique().all()):
+        return None
+    ordered = time.unique().sort().to_numpy()
+    pauses = np.diff(ordered)
+    return float(ordered[1:][np.argmax(pauses)]) if len(pauses) else None
 
 
 def _with_targets(table: "pl.DataFrame") -> "pl.DataFrame":
