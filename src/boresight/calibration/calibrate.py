@@ -37,6 +37,7 @@ NOT_TRUTH = (
     "The reference is a centre's system tracks, made from radars (perhaps this one among them), "
     "not truth: what all of them share does not show here, and their smoothing does."
 )
+NO_GATE = "The gate was not used: plots and reference both tell who a target is, and that decides."
 
 
 def calibrate(
@@ -75,6 +76,7 @@ def calibrate(
     left = stability(pairing.pairs, found)
     tables = detection_tables(pairing, mine, site)
     remarks += [*reference.remarks, *pairing.remarks, *found.remarks]
+    remarks += [NO_GATE] * (gate_m is not None and pairing.how == "identity")
     remarks += [NOT_TRUTH] * (reference.kind == "system tracks")
     return Calibration(
         errors=found.errors,

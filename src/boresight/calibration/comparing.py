@@ -116,7 +116,7 @@ def fit(plots: "pl.DataFrame") -> Array:
     who = [n for n in ("address", "mode_a", "radar_track") if n in plots.columns]
     same = pl.struct("time_s", "range_m", "azimuth_deg", *who)
     again = ~plots.select(same.is_first_distinct()).to_series().to_numpy()
-    reason[(reason == "") & again] = "repeated"
+    reason[np.isin(reason, ("", *ANONYMOUS)) & again] = "repeated"
     return reason
 
 

@@ -57,19 +57,19 @@ def detection_remarks(tables: "dict[str, pl.DataFrame]") -> list[str]:
         due, seen = (int(tables["detection_by_range"][name].sum()) for name in ("due", "seen"))
         share = f"{100.0 * seen / due:.1f} %"
         said.append(
-            f"In {seen} of {due} scans at which a target of the reference was in reach it has its "
-            f"plot ({share}); a target that does not answer this radar counts as missed."
+            f"In {seen:,} of {due:,} scans at which a target of the reference was in reach it has "
+            f"its plot ({share}); a target that does not answer this radar counts as missed."
         )
     if "false_by_range" in tables:
         counts = tables["false_by_range"]
         alone, repeated = (int(counts[name].sum()) for name in ("unidentified", "repeated"))
         if alone:
             said.append(
-                f"{alone} plots without an identity lie where the reference has no target; they "
+                f"{alone:,} plots without an identity lie where the reference has no target; they "
                 "are false only as far as the reference has every target."
             )
         if repeated:
-            said.append(f"{repeated} plots have an identity that is twice in their scan.")
+            said.append(f"{repeated:,} plots have an identity that is twice in their scan.")
     return said
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Array = Any
 GATE_M = 60.0
+_FULL = 0.25  # of the pairs in the outer half of the gate: more than the tails of a bell
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,7 +93,7 @@ def pair(
         how=how,
         scan_s=found.scan_s,
         due=due_scans(plots, reference, found, site),
-        remarks=remarks + _remarks(found, setting),
+        remarks=remarks + _remarks(plots, found, setting),
     )
 
 
@@ -139,13 +140,43 @@ def _measured(
     return tuple(z), np.stack(list(z.values()), axis=-1)
 
 
-def _remarks(found: Compared, setting: Setting) -> list[str]:
+def _remarks(plots: "pl.DataFrame", found: Compared, setting: Setting) -> list[str]:
     counts = np.bincount(found.source, minlength=len(HEIGHTS))
-    told = [f"{words} ({n})" for words, n in zip(HEIGHTS, counts, strict=True) if n]
+    told = [f"{words} ({n:,})" for words, n in zip(HEIGHTS, counts, strict=True) if n]
     remarks = [f"Heights of targets, with the number of pairs: {', '.join(told)}."]
+    again = int((found.reason == "repeated").sum())
+    if again:
+        remarks.append(
+            f"{again:,} plots repeat another's time, range, azimuth and identity: not used."
+        )
     if setting.how == "position":
         remarks.append(
             f"Plots and reference share no identity: pairs are those within {setting.gate_m:g} m, "
             f"where a radar track stays with one target for {FEWEST_HITS} plots or more."
         )
+        remarks += _gate(plots, found, setting.gate_m)
     return remarks
+
+
+def _gate(plots: "pl.DataFrame", found: Compared, gate_m: float) -> list[str]:
+    """A remark if the gate cuts pairs off: then biases seem smaller than they are."""
+    distance = _distance(plots, found)
+    share = float(np.mean(distance > gate_m / 2)) if len(distance) else 0.0
+    if share < _FULL:
+        return []
+    told = (
+        f"{100 * share:.0f} % of the pairs lie in the outer half of the gate of {gate_m:g} m: it "
+        "cuts off plots that err more, and biases seem smaller than they are. Give a wider one "
+        "(--gate) until this share is small."
+    )
+    return [told]
+
+
+def _distance(plots: "pl.DataFrame", found: Compared) -> Array:
+    """(m,) distance of each plot from its target's slant range and azimuth, m."""
+    slant = np.linalg.norm(found.position, axis=1)
+    azimuth = np.arctan2(found.position[:, 1], found.position[:, 0])
+    measured = column(plots, "range_m", np.nan)[found.plot]
+    turned = np.radians(column(plots, "azimuth_deg", np.nan)[found.plot])
+    gap: Array = np.abs(measured * np.exp(1j * turned) - slant * np.exp(1j * azimuth))
+    return gap

@@ -121,16 +121,21 @@ def _made(raw: "pl.DataFrame", kind: str, limits: Limits, skipped: int = 0) -> R
             why="; ".join(f"{count} {MEANINGS[each]}" for each, count in refused.items()),
             next_step="name another reference, or other limits",
         )
-    remarks += [
-        f"{count} reports of the reference were not used: {MEANINGS[each]}."
-        for each, count in refused.items()
-    ]
+    remarks += [_refusal(count, each, limits) for each, count in refused.items()]
     if "time_kind" in raw.columns and "time unknown" not in refused:
         kinds = raw["time_kind"].drop_nulls().unique().sort().to_list()
         if kinds != ["applicability"]:
             remarks.append(
-                f"The reference's times are those of {', '.join(kinds)}: by how much its positions "
-                "are older nobody says, and it is part of the time bias."
+                f"The reference's times are times of {' and '.join(kinds)}, not of its positions: "
+                "how old these are then nobody says, and it is part of the time bias."
             )
     gap = limits.longest_gap_s or longest_gap(table)
     return Reference(kind=kind, table=table, longest_gap_s=gap, refused=refused, remarks=remarks)
+
+
+def _refusal(count: int, reason: str, limits: Limits) -> str:
+    """One sentence: how many reports were refused, why, and by which limit."""
+    many = "1 report" if count == 1 else f"{count:,} reports"
+    verb = "was" if count == 1 else "were"
+    limit = {"poor accuracy": f" ({limits.accuracy_m:g} m)", "too old": f" ({limits.age_s:g} s)"}
+    return f"{many} of the reference {verb} not used: {MEANINGS[reason]}{limit.get(reason, '')}."
