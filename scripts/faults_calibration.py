@@ -15,7 +15,7 @@ JUDGES = {
     "calibration/pairing": _PAIRED,
     "calibration/comparing": _PAIRED,
     "calibration/due": _PAIRED,
-    "calibration/screening": ("calibration/test_references", "calibration/test_reference_faults"),
+    "calibration/screening": ("calibration/test_references", "calibration/test_reference_rules"),
     "calibration/faults": ("calibration/test_reference_faults", "calibration/test_pairing"),
     "calibration/detection": ("calibration/test_detection",),
     "calibration/false_plots": ("calibration/test_detection",),
@@ -179,7 +179,7 @@ FAULTS = (
         ('pl.col("time_s") + days * DAY_S', 'pl.col("time_s") - days * DAY_S'),
         ("ratio * FOOT_M - 1.0", "ratio - FOOT_M"),
         ("latitude_deg=north, longitude_deg=east", "latitude_deg=east, longitude_deg=north"),
-        ("(told[upper] > _HIGH_M) & ", ""),
+        ("axis=1) > _MOVING_MPS", "axis=1) < _MOVING_MPS"),
     ),
     *faults(
         "calibration/detection.py",

@@ -188,3 +188,18 @@ def test_a_reference_whose_targets_were_never_due_has_no_table():
     made, plots = pairing_of(due)
     assert detection_tables(made, plots, SITE) == {}
     assert detection_remarks({}) == []
+
+
+def test_a_blind_sector_is_where_it_is():
+    rng = np.random.default_rng(1)
+    due = due_table(rng, 400, 20, lambda r, _: r > 0.0)
+    azimuth = np.degrees(np.arctan2(due["east_m"], due["north_m"]).to_numpy()) % 360.0
+    blind = (azimuth >= 200.0) & (azimuth < 220.0)
+    due = due.with_columns(seen=pl.Series(~blind))
+    sectors = tables_of(due)["detection_by_azimuth"]
+    dark = sectors.filter(pl.col("seen") == 0)
+    assert dark["azimuth_from_deg"].to_list() == [200.0, 210.0]
+    assert dark["azimuth_to_deg"].to_list() == [210.0, 220.0]
+    lit = sectors.filter(pl.col("seen") > 0)
+    assert (lit["seen"] == lit["due"]).all()
+    assert lit.height == 34

@@ -6,6 +6,7 @@ import pytest
 from flown import SCAN_S, SITE, Aircraft, reference, sky
 
 from boresight.calibration.interpolation import Paths
+from boresight.calibration.matching import scan
 from boresight.calibration.pairing import pair
 from boresight.models.atmosphere import ExponentialAtmosphere
 
@@ -139,3 +140,30 @@ def test_a_target_that_is_never_seen_is_due_from_half_a_scan_on(tmp_path):
     mine = pair(plots, known, SITE).due.filter(pl.col("name") == hidden.address)
     assert mine["time_s"][0] == pytest.approx(hidden.start_s + SCAN_S / 2)
     assert mine["time_s"].diff().drop_nulls().unique().round(9).to_list() == [SCAN_S]
+
+
+def test_plots_of_a_target_are_kept_up_to_75_degrees(tmp_path):
+    above = Aircraft(1, north_deg=-0.281, east_deg=0.6)  # over the site after 300 s
+    plots = above.plots()
+    found = pair(plots, reference(tmp_path, above.reports()), SITE)
+    enu = above.enu(plots["time_s"].to_numpy())
+    steep = np.degrees(np.arctan2(enu[:, 2], np.hypot(enu[:, 0], enu[:, 1])))
+    assert found.dropped == {"overhead": int((steep > 74.93).sum())}  # where the cosine is 0.26
+    assert ((steep > 45.0) & (steep < 74.0)).sum() >= 5
+
+
+def test_the_turn_of_an_antenna_is_that_of_single_targets():
+    pairs_of_plots = [(3.0 * i, i) for i in range(10)] + [(3.0 * i + 4.0, i) for i in range(10)]
+    lone = [(100.0 + i, 50 + i) for i in range(30)]  # each seen once: nothing of a turn
+    time, track = zip(*pairs_of_plots, *lone, strict=True)
+    plots = pl.DataFrame({"time_s": time, "radar_track": track})
+    assert scan(plots, np.full(plots.height, "", dtype=object)) == 4.0
+
+
+def test_traffic_to_the_west_is_as_near_its_targets_as_to_the_east(tmp_path):
+    west = [Aircraft(n, north_deg=0.05 * n, east_deg=-1.0) for n in range(1, 4)]
+    plots = pl.concat([each.plots() for each in west])
+    assert (plots["azimuth_deg"] > 180.0).all()
+    found = pair(plots, reference(tmp_path, *(each.reports() for each in west)), SITE)
+    assert len(found.pairs) == plots.height
+    assert len(found.remarks) == 1  # of the heights
