@@ -4,6 +4,8 @@ An exact interval of 95 % misses at most once in twenty; where scans of one targ
 that counts scans as independent misses far more often, and is shown to.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -203,3 +205,44 @@ def test_a_blind_sector_is_where_it_is():
     lit = sectors.filter(pl.col("seen") > 0)
     assert (lit["seen"] == lit["due"]).all()
     assert lit.height == 34
+
+
+def test_what_targets_share_does_not_widen_where_each_has_one_scan():
+    """Ten targets are seen always or never; of fifty with a single scan the law is exact."""
+    group = np.repeat([0, 1], [10, 50])
+    due = np.repeat([40.0, 1.0], [10, 50])
+    hits = np.concatenate([np.repeat([40.0, 0.0], 5), np.repeat([1.0, 0.0], [37, 13])])
+    low, high = proportion_intervals(group, due, hits)
+    assert binom.sf(36, 50, low[1]) == pytest.approx(0.025, rel=1e-6)
+    assert binom.cdf(37, 50, high[1]) == pytest.approx(0.025, rel=1e-6)
+    assert high[0] - low[0] > 0.5  # 400 independent scans would have 0.1
+
+
+def anonymous(scan, azimuth_off_deg, at):
+    """A table of one outward flight: 100 plots of it, and one without identity, off in azimuth.
+
+    Every pair is 0.2 degrees off. The other plot is where the flight is at one scan, at the time of
+    another.
+    """
+    due = due_table(np.random.default_rng(0), 1, 100, lambda r, _: r > 0.0)
+    place = due.select("north_m", "east_m", "up_m").to_numpy()
+    range_m = np.linalg.norm(place, axis=1)
+    azimuth = np.degrees(np.arctan2(place[:, 1], place[:, 0]))
+    made, _ = pairing_of(due, reason=["", *[""] * 99, "no identity"])
+    z = np.stack([range_m, np.radians(azimuth + 0.2)], axis=1)
+    made = replace(made, pairs=replace(made.pairs, z=z))
+    plots = pl.DataFrame(
+        {
+            "time_s": [*due["time_s"], due["time_s"][at]],
+            "range_m": [*range_m, range_m[scan]],
+            "azimuth_deg": [*(azimuth + 0.2), azimuth[scan] + azimuth_off_deg],
+        }
+    )
+    counts = detection_tables(made, plots, SITE)["false_by_range"]
+    return counts["near_target"].sum(), counts["unidentified"].sum()
+
+
+def test_a_plot_is_near_a_target_within_what_pairs_are_apart_there_and_then():
+    assert anonymous(scan=50, azimuth_off_deg=0.5, at=50) == (1, 0)
+    assert anonymous(scan=50, azimuth_off_deg=3.0, at=50) == (0, 1)
+    assert anonymous(scan=50, azimuth_off_deg=0.5, at=90) == (0, 1)

@@ -130,3 +130,11 @@ def test_a_registration_leaves_delays_in_and_the_noise_table_takes_them_out():
     by_range = noise_tables(pairs, found)["noise_by_range"]
     mean = np.average(by_range["range_sd_m"], weights=by_range["pairs"].to_numpy())
     assert mean == pytest.approx(15.0, rel=0.06)
+
+
+def test_a_value_on_an_edge_is_of_the_interval_above_and_enough_is_enough():
+    values = np.array([0.0, 5.0, 10.0, 10.0, 20.0])
+    found = joined(values, np.array([0.0, 10.0, 20.0]), np.zeros(5, int), rows=2, targets=1)
+    assert found.index.tolist() == [0, 0, 1, 1, -1]
+    assert found.low.tolist() == [0.0, 10.0]
+    assert found.high.tolist() == [10.0, 20.0]
