@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import isfinite
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ class Applied:
 
 
 def applied(
-    calibration: "Calibration | Path | None",
+    calibration: "Calibration | str | PathLike[str] | None",
     plots: "pl.DataFrame",
     *,
     site: "Site | None",
@@ -41,15 +42,15 @@ def applied(
         atmosphere: given; None: that of the calibration.
 
     Raises:
-        UsageError: another air than that of the calibration.
+        UsageError: another air than that of the calibration, or no calibration at all.
+        MissingInputError: its file is not there or cannot be read.
+        DataError: its file is no calibration.
     """
     if calibration is None:
         return Applied(
             arguments={"site": site, "sensor": sensor, "atmosphere": atmosphere}, remarks=[]
         )
-    from boresight.calibration.file import read_calibration
-
-    found = read_calibration(calibration) if isinstance(calibration, Path) else calibration
+    found = _found(calibration)
     known = plots["sensor"].unique().to_list() if "sensor" in plots.columns else []
     remarks = []
     chosen = sensor or (found.sensor if found.sensor in known else None)
@@ -69,6 +70,20 @@ def applied(
         "delay_m": delay if isfinite(delay) else 0.0,
     }
     return Applied(arguments=arguments, remarks=remarks)
+
+
+def _found(given: "Calibration | str | PathLike[str]") -> "Calibration":
+    from boresight.calibration.file import read_calibration
+    from boresight.calibration.result import Calibration
+
+    if isinstance(given, str | PathLike):
+        return read_calibration(Path(given))
+    if not isinstance(given, Calibration):
+        raise UsageError(
+            f"the calibration is a {type(given).__name__}",
+            next_step="give what calibrate returns, or the path of a calibration.toml",
+        )
+    return given
 
 
 def _air(found: "Calibration", given: "Atmosphere | None") -> "Atmosphere | None":

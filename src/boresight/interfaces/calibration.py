@@ -5,10 +5,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boresight.errors import UsageError
+from boresight.errors import DataError, UsageError
 from boresight.interfaces import door, reading
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
+from boresight.models.checks import as_number
 
 if TYPE_CHECKING:
     import polars as pl
@@ -28,8 +29,8 @@ def calibrate(
     reference: "str | PathLike[str] | pl.DataFrame",
     site: Site | tuple[float, float, float] | None = None,
     sensor: str | None = None,
-    terms: Sequence[str] | None = None,
-    atmosphere: Atmosphere | None = None,
+    terms: Sequence[str] | str | None = None,
+    atmosphere: Atmosphere | str | None = None,
     gate_m: float | None = None,
 ) -> "Calibration":
     """Find what is wrong with a radar, and how sure that is.
@@ -43,8 +44,10 @@ def calibrate(
             Left out: what the recording says of it, if `plots` is a recording that does.
         sensor: "SAC/SIC", if the plots are of several.
         terms: what may be wrong: full names such as "range_bias_m", or "range", "gain", "azimuth",
-            "eccentricity", "time", "elevation", "site". Left out: all but the site.
-        atmosphere: the air whose delay is taken out of the ranges before; None for none.
+            "eccentricity", "time", "elevation", "site"; in a list, or in a text, parted by commas.
+            Left out: all but the site.
+        atmosphere: the air whose delay is taken out of the ranges before, such as "exponential";
+            None for none.
         gate_m: how far from its plot a target may be where the radar tells no identity.
 
     Returns:
@@ -53,24 +56,68 @@ def calibrate(
 
     Raises:
         UsageError: no site is known, or "adsb" of a frame that is not as `read` gave it.
-        DataError: the reference has nothing in common with the plots.
+        DataError: the reference has nothing in common with the plots, or a column is missing.
     """
+    import polars as pl
+
     read = reading.recording(plots)
+    _check_frame(read.plots)
     if isinstance(reference, str) and reference in IN_THE_RECORDING and not read.summary:
         raise UsageError(
             f"a frame of plots holds no reference {reference!r}",
             why="only the frame that read gave, as it gave it, knows the recording it came from",
             next_step="give the recording's path instead of the frame, or the reference's own",
         )
+    if sensor is not None and "sensor" in read.plots.columns:
+        sensor = door.sensor(sensor, read.plots["sensor"].drop_nulls().unique().sort().to_list())
+    if gate_m is not None:
+        as_number("gate_m", gate_m)
+    if not isinstance(reference, str | PathLike | pl.DataFrame):
+        raise UsageError(
+            f"the reference is a {type(reference).__name__}",
+            next_step='give "adsb", "system-tracks" or "downlink", a file, or a Polars frame',
+        )
     return calibrated(
         read,
         Path(reference) if isinstance(reference, PathLike) else reference,
         site=door.place(site) or reading.own_site(read, sensor),
         sensor=sensor,
-        terms=None if terms is None else door.terms(",".join(terms)),
-        atmosphere=atmosphere,
+        terms=None if terms is None else _terms(terms),
+        atmosphere=door.atmosphere(atmosphere),
         gate_m=gate_m,
     )
+
+
+def _terms(given: Sequence[str] | str) -> tuple[str, ...]:
+    return door.terms(given if isinstance(given, str) else ",".join(given))
+
+
+def _check_frame(plots: "pl.DataFrame") -> None:
+    """UsageError or DataError where plots are no frame, or lack a column or numbers in it."""
+    import polars as pl
+
+    from boresight.formats.schema import OUR_NAMES, PLOTS
+
+    if not isinstance(plots, pl.DataFrame):
+        raise UsageError(
+            f"the plots are a {type(plots).__name__}", next_step="give what read returns, or a path"
+        )
+    lacking = [name for name in PLOTS.required if name not in plots.columns]
+    wrong = [
+        name
+        for name, dtype in plots.schema.items()
+        if name in OUR_NAMES.values() and not (dtype.is_numeric() or dtype in (pl.Null, pl.Boolean))
+    ]
+    if plots.is_empty():
+        raise DataError("there are no plots", next_step="boresight inspect FILE says what it holds")
+    if lacking or wrong:
+        raise DataError(
+            f"the plots have no column {lacking[0]!r}"
+            if lacking
+            else f"the plots' column {wrong[0]!r} holds {plots[wrong[0]].dtype}, not numbers",
+            why=f"their columns are {', '.join(plots.columns)}",
+            next_step="see boresight.read; cast text to numbers with cast(pl.Float64)",
+        )
 
 
 def calibrated(

@@ -36,25 +36,31 @@ def place(given: "Site | tuple[float, float, float] | None") -> "Site | None":
     """A site, or latitude, longitude (degrees) and height (m) as one.
 
     Raises:
-        UsageError: no place on Earth.
+        UsageError: not three numbers, or no place on Earth.
     """
     from boresight.maths.frames import Site
 
     if given is None or isinstance(given, Site):
         return given
-    latitude, longitude, height = given
+    try:
+        latitude, longitude, height = (float(each) for each in given)
+    except (TypeError, ValueError):
+        raise UsageError(
+            f"the site {given!r} is not three numbers",
+            next_step="give (latitude_deg, longitude_deg, height_m), north and east positive",
+        ) from None
     return Site(latitude_deg=latitude, longitude_deg=longitude, height_m=height)
 
 
-def atmosphere(text: str) -> "Atmosphere | None":
-    """The air of that name, None for none.
+def atmosphere(given: "str | Atmosphere | None") -> "Atmosphere | None":
+    """The air of that name, None for none; or the air itself.
 
     Raises:
         UsageError: no such air.
     """
     from boresight.models.atmosphere import atmosphere as named
 
-    return named(text)
+    return named(given) if isinstance(given, str) else given
 
 
 # What a user may write for terms of systematic error, beside their full names.

@@ -192,8 +192,8 @@ def track(
     sensor: str | None = None,
     filter: str = door.FILTER,  # noqa: A002 - the field's word
     compare: Sequence[str] | Literal["all"] = (),
-    calibration: "Calibration | None" = None,
-    atmosphere: Atmosphere | None = None,
+    calibration: "Calibration | str | PathLike[str] | None" = None,
+    atmosphere: Atmosphere | str | None = None,
 ) -> "TrackingResult":
     """Tracks of every identified target of one radar.
 
@@ -204,17 +204,18 @@ def track(
         filter: of the catalogue.
         compare: further filters to run on the same plots with the same noise, or "all" that can
             take them; the result's `filters` and `scores`, and the report, set them side by side.
-        calibration: what `calibrate` found: plots are corrected by it, its noise is used, and what
-            it leaves uncertain is in the covariances (Schmidt).
+        calibration: what `calibrate` found, or its calibration.toml: plots are corrected by it, its
+            noise is used, and what it leaves uncertain is in the covariances (Schmidt).
         atmosphere: the air whose delay is taken out of the ranges, such as
-            `ExponentialAtmosphere()`; left out: that of the calibration, or none.
+            "exponential" or `ExponentialAtmosphere()`; left out: that of the calibration, or none.
     """
     from boresight.tracking.tracker import track as track_plots
 
     (first, *others), is_all = door.filters(
         [filter, *([compare] if isinstance(compare, str) else compare)]
     )
-    using = applied(calibration, plots, site=door.place(site), sensor=sensor, atmosphere=atmosphere)
+    air = door.atmosphere(atmosphere)
+    using = applied(calibration, plots, site=door.place(site), sensor=sensor, atmosphere=air)
     result = track_plots(plots, filter=first, compare=others, leave_out=is_all, **using.arguments)
     return replace(result, remarks=[*using.remarks, *result.remarks])
 
@@ -230,10 +231,20 @@ def report(
         tracks: what `track` gives; or what `calibrate` gives, for a page about that alone.
         calibration: what `calibrate` gives, for a page about both.
         about: `inspection`, what `inspect` says of the file, and `command`, as the page shows them.
+
+    Raises:
+        UsageError: neither tracks nor a calibration.
     """
     from boresight.calibration.result import Calibration
     from boresight.interfaces.report import report as build
+    from boresight.tracking.result import TrackingResult
 
+    for value, kind in ((tracks, TrackingResult | Calibration), (calibration, Calibration)):
+        if value is not None and not isinstance(value, kind):
+            raise UsageError(
+                f"a {type(value).__name__} cannot be reported on",
+                next_step="pass report(tracks, calibration): what track and calibrate return",
+            )
     if isinstance(tracks, Calibration):
         return build(calibration=tracks, **about)
     return build(tracks, calibration=calibration, **about)

@@ -87,6 +87,8 @@ def inliers(residuals: "pl.DataFrame") -> "pl.DataFrame":
 
 def panels(residuals: "pl.DataFrame") -> list[Panel]:
     """Draw each channel against range, azimuth, time and height; outliers left out."""
+    if residuals.is_empty():  # of a calibration that was read from its file
+        return []
     kept = inliers(residuals)
     against = [each for each in SEEN_AGAINST if each.column in kept.columns]
     target = kept["target"].rank("dense").to_numpy().astype(int) - 1
