@@ -93,7 +93,9 @@ def _assuming(key: str, assume: Mapping[str, Any]) -> dict[str, Any]:
                 why="it must be of the same kind: a number, a word, or a list of them",
                 next_step=f"as it is: --assume {name}={json.dumps(usual)}",
             )
-    return table | {"assumed": table["assumed"] | dict(assume)}
+    asked = {name: f"asked for: {name} = {value}" for name, value in assume.items()}
+    why = table.get("why", {}) | asked  # reasons are those of the usual assumptions
+    return table | {"assumed": table["assumed"] | dict(assume), "why": why}
 
 
 def _kind(value: Any) -> tuple[str, int]:

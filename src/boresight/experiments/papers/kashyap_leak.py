@@ -5,7 +5,7 @@ trajectory; a filter that is told no more than they are has a ratio of 1 at best
 have white noise without a bias, so nothing but the reference itself can bring a ratio below 1.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from boresight.experiments.papers.kashyap_methods import Method, emekf, plain, p
 from boresight.experiments.papers.kashyap_runs import chunks
 from boresight.experiments.scenario import Scenario
 from boresight.experiments.simulate import Truth
+from boresight.filters.error_model import correct
 from boresight.models.error_model import MODELS, ErrorModel
 
 Array = Any
@@ -83,6 +84,55 @@ def outage(
     return {name: float(np.median(np.sqrt(square[:, gap]))) for name, square in found.items()}
 
 
+def biased(
+    world: Scenario,
+    bias: Sequence[float],
+    scans: tuple[int, int],
+    model: ErrorModel,
+    runs: int,
+    seed: int,
+) -> dict[str, dict[str, float]]:
+    """Errors before an outage and in it, where plots have a bias (m, deg, deg)."""
+    added = np.array([bias[0], *np.radians(bias[1:])])
+    before, gap = slice(_SETTLED.start, scans[0]), slice(*scans)
+
+    def reference(truth: Truth) -> Array:
+        at = positions(truth)
+        at[:, gap] = np.nan
+        return at
+
+    default = MODELS["random walk"]
+    methods: dict[str, Method] = {
+        "EMEKF": emekf(model, reference=reference),
+        "our default error model": emekf(default, reference=reference),
+        "EKF, no reference at all": plain("ekf"),
+    }
+    found = _squares(world, methods, runs, seed, added)
+    found |= _squares(world, {"EKF on plots without the bias": plain("ekf")}, runs, seed)
+    errors = {
+        label: {name: float(np.sqrt(np.mean(each[:, part]))) for name, each in found.items()}
+        for label, part in (("with a reference", before), ("in the outage", gap))
+    }
+    off = {
+        f"{name}, {channel}": value
+        for name, each in (("EMEKF", model), ("our default error model", default))
+        for channel, value in _off(world, added, before, each, runs, seed).items()
+    }
+    return errors | {"error of the estimated bias": off}
+
+
+def _off(
+    world: Scenario, bias: Array, scans: slice, model: ErrorModel, runs: int, seed: int
+) -> dict[str, float]:
+    """Root mean square error of the estimated bias, in standard deviations of a plot."""
+    truth, plots = next(chunks(world, runs, seed))
+    radar: Any = world.sensor
+    found = correct(plots.z + bias, positions(truth), plots.dt, radar, model=model)
+    sigma = np.array([each.sigma for each in radar.components(world.motion)])
+    off = np.sqrt(np.mean(np.square(found.error[:, scans] + bias), axis=(0, 1))) / sigma
+    return dict(zip(("range", "azimuth", "elevation"), map(float, off), strict=True))
+
+
 def slower(
     world: Scenario, every: int, model: ErrorModel, runs: int, seed: int
 ) -> dict[str, float]:
@@ -105,11 +155,12 @@ def slower(
 
 
 def _squares(
-    world: Scenario, methods: Mapping[str, Method], runs: int, seed: int
+    world: Scenario, methods: Mapping[str, Method], runs: int, seed: int, bias: Any = 0.0
 ) -> dict[str, Array]:
-    """Squared position errors (runs, scans) by method."""
+    """Squared position errors (runs, scans) by method, a bias added to plots."""
     found: dict[str, list[Array]] = {name: [] for name in methods}
     for truth, plots in chunks(world, runs, seed):
         for name, method in methods.items():
-            found[name].append(squared_error(track(method, world, truth, plots), truth))
+            estimate = track(method, world, truth, plots._replace(z=plots.z + bias))
+            found[name].append(squared_error(estimate, truth))
     return {name: np.concatenate(each) for name, each in found.items()}

@@ -11,8 +11,8 @@ from boresight.experiments.papers.kashyap_methods import Method, ecmkf, plain, t
 from boresight.experiments.papers.kashyap_runs import Tracked
 from boresight.experiments.papers.kashyap_study import Study
 from boresight.experiments.papers.kashyap_words import (
-    LEAK,
     by_channel,
+    leak,
     numbers,
     of_table,
     part,
@@ -51,7 +51,7 @@ def printed(table: Mapping[str, Any]) -> dict[str, dict[str, float]]:
 
 def told(study: Study) -> str:
     """What every number of the tables depends on."""
-    return f"Assumed: {reasons(study, 'error_model', 'begin')}; {study.runs} truths. {LEAK}"
+    return f"Assumed: {reasons(study, 'error_model', 'begin')}; {study.runs} truths. {leak(study)}"
 
 
 def _costs(study: Study) -> Claim:
@@ -185,6 +185,7 @@ def _third(study: Study) -> Claim:
     methods = printed(study.table["tables"]["KA-T4"])
     found = {method: study.third[method].pfe for method in methods}
     stated, ours = ratios(methods, "ecmkf", "emekf"), ratios(found, "ecmkf", "emekf")
+    worse = ", ".join(name.split()[1] for name, value in stated.items() if value > 1.0)
     return row(
         study,
         "tables",
@@ -194,7 +195,8 @@ def _third(study: Study) -> Claim:
         band={m: {c: band_of(v) for c, v in pfe.items()} for m, pfe in found.items()},
         verdict="cannot be checked",
         assumption=f"{study.stand_in}; "
-        + reasons(study, "set_3", "set_3_sigma", "set_3_accel_mps2"),
+        + reasons(study, "set_3", "set_3_sigma", "set_3_accel_mps2")
+        + f". As printed, EMEKF is the worse one in {worse}",
         parts=tuple(
             part(
                 "KA-T4",
@@ -219,7 +221,7 @@ def _orders(study: Study) -> Claim:
             change = one.pfe[channel] / base[channel]
             parts.append(
                 _order(
-                    f"case {number} {channel}",
+                    f"case {number} {channel}" + (", to case 1" if number > 1 else ""),
                     text,
                     cases[0]["emekf"][channel],
                     one.pfe[channel],
