@@ -5,13 +5,19 @@ reference is named as what it is, since a centre's tracker is no GPS.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boresight.calibration.screening import COLUMNS, LIMITS, MEANINGS, Limits, longest_gap, screened
 from boresight.errors import DataError, unknown
-from boresight.formats.recording import TABLE_SUFFIXES, Recording, read_recording, readable
+from boresight.formats.recording import (
+    TABLE_SUFFIXES,
+    Recording,
+    damage,
+    read_recording,
+    readable,
+)
 from boresight.formats.schema import REFERENCE
 from boresight.formats.tables import read_table
 
@@ -84,7 +90,8 @@ def from_file(
     if file.suffix.lower() not in TABLE_SUFFIXES:
         recording = read_recording(file)
         kind = "adsb" if recording.reference.height else "system tracks"
-        return from_recording(recording, kind, limits=limits)
+        found = from_recording(recording, kind, limits=limits)
+        return replace(found, remarks=[*damage(file, recording.summary), *found.remarks])
     table, skipped = read_table(file, REFERENCE, columns=columns)
     return _made(table, "table", limits or LIMITS["table"], skipped)
 

@@ -97,6 +97,15 @@ def _jump_notes(table: "pl.DataFrame") -> list[str]:
     return [f"{told}: kept as recorded, marked position_jumps."]
 
 
+def damage(file: Path, summary: Mapping[str, Any]) -> list[str]:
+    """A sentence if part of a recording was skipped, from what `inspect` says of it."""
+    if not summary["skipped_bytes"]:
+        return []
+    lost = f"{summary['skipped_bytes']:,} of {summary['bytes']:,} bytes of {file.name}"
+    places = [f"{each['reason']} at byte {each['offset']:,}" for each in summary["damaged"][:1]]
+    return [f"{lost} were skipped as damaged; {places[0] if places else 'see inspect'}."]
+
+
 def inspect(
     path: str | Path,
     *,

@@ -1,7 +1,7 @@
 """The work of `boresight calibrate`: read, calibrate, write down, answer."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +45,7 @@ def calibrate(
     folder: Path | None,
 ) -> Answer:
     """Find what is wrong with a recording's radar; with a folder, write it down."""
-    from boresight.formats.recording import read_recording
+    from boresight.formats.recording import damage, read_recording
 
     target = door.folder(folder) if folder else None
     with progress(f"Reading {file.name}", manner) as watch:
@@ -63,6 +63,7 @@ def calibrate(
             atmosphere=atmosphere,
             gate_m=gate_m,
         )
+    found = replace(found, remarks=[*damage(file, read.summary), *found.remarks])
     about = read.summary | {"file": file.name, "sha256": sha256(file)}
     outputs = write(found, target, about, manner) if target else []
     return Answer(

@@ -53,7 +53,7 @@ def track(
     folder: Path | None,
 ) -> Answer:
     """Track a recording; with a folder, write tables and the report into it."""
-    from boresight.formats.recording import read_recording
+    from boresight.formats.recording import damage, read_recording
     from boresight.interfaces.report import report
     from boresight.tracking.tracker import track as track_plots
 
@@ -75,7 +75,8 @@ def track(
             progress=watch.count,
             **using.arguments,
         )
-    result = replace(result, remarks=[*using.remarks, *result.remarks])
+    told = [*damage(file, read.summary), *using.remarks, *result.remarks]
+    result = replace(result, remarks=told)
     outputs = []
     if target:
         about = read.summary | {"file": file.name, "sha256": sha256(file)}
