@@ -1,4 +1,4 @@
-"""Pairs as the fit reads them: by channel, sorted by target, linearised at a place."""
+"""Pairs as the fit reads them: by channel, sorted by target and time, linearised at a place."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -8,6 +8,7 @@ import numpy as np
 from boresight.calibration.clusters import Sums
 from boresight.calibration.laws import Setting, setting
 from boresight.calibration.pairs import Pairs
+from boresight.calibration.wander import Inverse, Wander, inverse
 from boresight.models.systematic import SystematicErrors, effects
 
 Array = Any
@@ -24,6 +25,7 @@ class Columns(NamedTuple):
         order: (m,) rows of the pairs.
         starts: (targets,) first row of each target that has any.
         target: (targets,) their numbers in the pairs.
+        gap_s: (m,) since the target's pair before, infinite at its first.
         residual: (k, m) measured minus expected at the place of linearisation; 0 if not seen.
         at: what the laws need to know.
         touch: for each channel the terms that touch it, (n_c,).
@@ -35,6 +37,7 @@ class Columns(NamedTuple):
     order: Array
     starts: Array
     target: Array
+    gap_s: Array
     residual: Array
     at: Setting
     touch: tuple[Array, ...]
@@ -58,6 +61,21 @@ class Columns(NamedTuple):
         if self.ranging >= 0:
             left[self.ranging] -= np.repeat(delay, self.counts)
         return self.at.seen * left
+
+    def inverses(self, weight: Array, wander: Wander) -> tuple[Inverse, ...]:
+        """Of each channel's covariance under weights (k, m), delays aside."""
+        laws = zip(weight, wander.variance, wander.time_s, strict=True)
+        return tuple(inverse(row, self.gap_s, *law) for row, *law in laws)
+
+    def worth(self, inverses: tuple[Inverse, ...]) -> Array:
+        """(k, m) what a pair's weight is worth: so its target tells of a level what it can."""
+        worth = np.ones_like(self.residual)
+        for channel, own in enumerate(inverses):
+            if own.slow is not None:
+                power = self.by_target(own(np.ones(len(self.order))))
+                share = power / np.maximum(self.by_target(own.weight), np.finfo(float).tiny)
+                worth[channel] = np.repeat(share, self.counts)
+        return worth
 
     def sums(self, weight: Array, prior: Array) -> Sums:
         """Normal equations under weights (k, m) and prior inverse variances (n,)."""
@@ -95,9 +113,11 @@ class Columns(NamedTuple):
 
 def columns(pairs: Pairs, terms: tuple[str, ...], moved: Array) -> Columns:
     """Arrange pairs, linearised where the moving ones of the terms (n,) put the targets."""
-    order = np.argsort(pairs.target, kind="stable")
+    order = np.lexsort((pairs.time_s, pairs.target))
     sorted_pairs = pairs.take(order)
     target, starts = np.unique(sorted_pairs.target, return_index=True)
+    gap_s = np.diff(sorted_pairs.time_s, prepend=0.0)
+    gap_s[starts] = np.inf
     known = SystematicErrors(terms=terms, estimate=moved, cov=np.zeros((len(terms), len(terms))))
     placed = replace(sorted_pairs, position=_place(sorted_pairs, known))
     touch, effect = _effects(placed, terms)
@@ -115,6 +135,7 @@ def columns(pairs: Pairs, terms: tuple[str, ...], moved: Array) -> Columns:
         order=order,
         starts=starts,
         target=target,
+        gap_s=gap_s,
         residual=np.where(seen, residual, 0.0),
         at=setting(seen.astype(float), extra, lever, second),
         touch=touch,

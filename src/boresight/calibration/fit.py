@@ -11,6 +11,7 @@ from boresight.calibration.fixed_point import fixed_point
 from boresight.calibration.laws import Classes, Errors, Laws, first_laws
 from boresight.calibration.pairs import Pairs
 from boresight.calibration.robust import classify, late_is_apart, refit
+from boresight.calibration.wander import MOST, Inverse, Residuals, Wander, wandering
 from boresight.models.systematic import TERMS
 
 Array = Any
@@ -20,7 +21,24 @@ _MOST = 300  # steps
 _TOLERANCE = 1e-5  # of a term in standard deviations, of a law in logarithm
 _START_PAIRS, _START_STEPS = 20_000, 40
 _MAD = 1.4826  # standard deviation over median of the absolute, normal law
+_OUTLIER = 0.5  # probability from which a pair counts as none
+_ROUNDS = 3  # of laws of wandering and all else in turn
+_WANDER_PAIRS = 50_000  # about as many tell how errors wander
 _NEARLY = 1e-3  # of the spread: residuals of the start below it weigh alike
+
+
+class Slow(NamedTuple):
+    """What is known of errors that wander along their target.
+
+    Attributes:
+        mean: (k, m) expected.
+        error: (k, m) variance around it, the delay being known.
+        left: (m,) of an error of the delay that the wandering does not take up.
+    """
+
+    mean: Array
+    error: Array
+    left: Array
 
 
 class State(NamedTuple):
@@ -32,6 +50,8 @@ class State(NamedTuple):
         delay_error: (targets,) variance of their errors.
         delay_var: variance of the delays.
         laws: of noise and outliers.
+        wander: how errors wander along a target.
+        slow: where they did; None if they do not.
     """
 
     terms: Array
@@ -39,6 +59,8 @@ class State(NamedTuple):
     delay_error: Array
     delay_var: float
     laws: Laws
+    wander: Wander
+    slow: Slow | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,8 +72,9 @@ class Fit:
         state: terms, delays, laws.
         errors: what is known of each pair's error.
         classes: narrow, wide, outlier.
+        worth: (k, m) factors of weights, below 1 where errors of one target are alike.
         prior: (n,) inverse variances believed before.
-        after: (k, m) residuals without terms and delays.
+        after: (k, m) residuals without terms, delays, and what wanders.
         converged: whether the search settled.
     """
 
@@ -59,6 +82,7 @@ class Fit:
     state: State
     errors: Errors
     classes: Classes
+    worth: Array
     prior: Array
     after: Array
     converged: bool
@@ -75,37 +99,56 @@ class Fit:
         delay[self.pairs.target] = self.state.delay
         return delay
 
-    def robust_sd(self) -> Array:
-        """(k,) of what is left, outliers aside."""
-        real = self.classes.outlier < 0.5
-        return _spread(self.after[:, real], self.pairs.at.seen[:, real])
+    def level(self) -> Array:
+        """(k, m) residuals without terms and delays; what wanders is in."""
+        slow = self.state.slow
+        return self.after if slow is None else self.after + self.pairs.at.seen * slow.mean
+
+    def whole(self) -> Array:
+        """(k, m) residuals without terms; delays are in too."""
+        left = self.level().copy()
+        if self.pairs.ranging >= 0:
+            delay = np.repeat(self.state.delay, self.pairs.counts)
+            left[self.pairs.ranging] += self.pairs.at.seen[self.pairs.ranging] * delay
+        return left
+
+    def robust_sd(self, left: Array) -> Array:
+        """(k,) of residuals (k, m), outliers aside."""
+        real = self.classes.outlier < _OUTLIER
+        return spread(left[:, real], self.pairs.at.seen[:, real])
 
     def scores(self) -> Array:
         """(targets, n) sums over each target's pairs of effect times influence."""
-        return self.pairs.scores(self.classes.weight * self.after, len(self.prior))
+        weight = self.worth * self.classes.weight
+        return self.pairs.scores(weight * self.level(), len(self.prior))
 
-    def information(self, *, delays: bool = True) -> Array:
-        """(targets, n, n) at this noise; without `delays` as if every pair erred by itself.
-
-        The curvature is averaged over a channel's pairs: single ones can have none.
-        """
-        n, weight = len(self.prior), self._curved()
+    def information(self) -> Array:
+        """(targets, n, n) at this noise."""
+        n, weight = len(self.prior), self.worth * self._curved()
         total = self.pairs.normals(weight, n)
-        if delays and self.pairs.ranging >= 0:
+        if self.pairs.ranging >= 0:
             sums = self.pairs.sums(weight, self.prior)
             kept = self.state.delay_var / (1.0 + self.state.delay_var * sums.own)
             total -= kept[:, None, None] * sums.cross[:, :, None] * sums.cross[:, None, :]
         return total
 
+    def alone(self) -> Array:
+        """(n, n) information as if every pair erred by itself."""
+        weight = self._curved()
+        weight /= 1.0 + self.state.wander.variance[:, None] * weight
+        return self.pairs.normals(weight, len(self.prior)).sum(0)
+
     def _curved(self) -> Array:
+        """(k, m) weights with the curvature of the law, averaged: single pairs can have none."""
         weight = self.classes.weight
         total = np.maximum(weight.sum(1), np.finfo(float).tiny)
         return weight * np.maximum(self.classes.curvature.sum(1) / total, 0.0)[:, None]
 
     def geometry(self) -> Array:
-        """(targets, n, n) information of all pairs as if none were an outlier."""
-        variance = self.state.laws.variance + self.pairs.at.extra
-        return self.pairs.normals(self.pairs.at.seen / variance, len(self.prior))
+        """(targets, n, n) information as if no pair were an outlier, and each erred by itself."""
+        variance = self.state.laws.variance + self.state.wander.variance[:, None]
+        weight = self.pairs.at.seen / (variance + self.pairs.at.extra)
+        return self.pairs.normals(weight, len(self.prior))
 
 
 def fit(pairs: Pairs, terms: tuple[str, ...], *, robust: bool, delays: bool) -> Fit:
@@ -123,16 +166,40 @@ def fit(pairs: Pairs, terms: tuple[str, ...], *, robust: bool, delays: bool) -> 
     if few is not pairs or any(term in MOVING for term in terms):
         data = columns(pairs, terms, state.terms)
         state, converged = _search(data, state, prior, delays=delays)
+    for _ in range(_ROUNDS if delays else 0):
+        wander = _wander(data, state)
+        if not wander.variance.any():
+            break
+        state, converged = _search(data, state._replace(wander=wander), prior, delays=delays)
     errors, after = _errors(data, state)
+    classes = classify(errors, state.laws)
     return Fit(
         pairs=data,
         state=state,
         errors=errors,
-        classes=classify(errors, state.laws),
+        classes=classes,
+        worth=data.worth(data.inverses(classes.weight, state.wander)),
         prior=prior,
         after=after,
         converged=converged,
     )
+
+
+def _wander(data: Columns, state: State) -> Wander:
+    """How errors wander, outliers aside; of some of the targets where there are many pairs."""
+    errors, left = _errors(data, state)
+    if state.slow is not None:
+        left = left + data.at.seen * state.slow.mean
+    classes = classify(errors, state.laws)
+    weight = classes.weight * (classes.outlier < _OUTLIER)
+    step = -(-left.shape[1] // _WANDER_PAIRS)
+    some = np.repeat(np.arange(len(data.starts)) % step == 0, data.counts)
+    laws = [
+        wandering(Residuals(y[some], w[some], data.gap_s[some], channel == data.ranging))
+        for channel, (y, w) in enumerate(zip(left, weight, strict=True))
+    ]
+    variance, time_s = np.array(laws).T
+    return Wander(variance, time_s)
 
 
 def _search(data: Columns, start: State, prior: Array, *, delays: bool) -> tuple[State, bool]:
@@ -140,10 +207,14 @@ def _search(data: Columns, start: State, prior: Array, *, delays: bool) -> tuple
     random = delays and data.ranging >= 0 and len(data.starts) >= _FEWEST
     first, solved = _step(data, start, prior, random=random)
     sd = np.sqrt(np.diag(np.linalg.inv(solved.information)))
-    packing = Packing(sd, first.laws.sd[max(data.ranging, 0)], len(first.delay), first.laws)
+    packing = Packing(sd, first.laws.sd[max(data.ranging, 0)], first)
+    reached = [first]
 
     def step(vector: Array) -> Array:
-        return packing.pack(_step(data, packing.unpack(vector), prior, random=random)[0])
+        # what wanders is one number for each pair: too many to mix, it goes on from the last step
+        state = packing.unpack(vector)._replace(slow=reached[0].slow)
+        reached[0], _ = _step(data, state, prior, random=random)
+        return packing.pack(reached[0])
 
     vector, converged = fixed_point(
         step,
@@ -152,27 +223,48 @@ def _search(data: Columns, start: State, prior: Array, *, delays: bool) -> tuple
         tolerance=_TOLERANCE,
         most=_MOST,
     )
-    return packing.unpack(vector), converged
+    return packing.unpack(vector)._replace(slow=reached[0].slow), converged
 
 
 def _step(data: Columns, state: State, prior: Array, *, random: bool) -> tuple[State, Solved]:
     """One step: classes, then terms and delays, then laws."""
     errors, _ = _errors(data, state)
     classes = classify(errors, state.laws)
-    sums = data.sums(classes.weight, prior)
+    inverses = data.inverses(classes.weight, state.wander)
+    sums = data.sums(data.worth(inverses) * classes.weight, prior)
     solved = solve(sums, state.delay_var)
     variance = delay_variance(sums, solved, state.delay_var) if random else 0.0
-    laws = refit(errors, classes, state.laws)
-    return State(solved.terms, solved.delay, solved.delay_var, variance, laws), solved
+    laws = refit(errors, classes, state.laws).no_finer(np.sqrt(state.wander.variance / MOST))
+    slow = _slow(data, inverses, solved) if state.wander.variance.any() else None
+    moved = state._replace(
+        terms=solved.terms, delay=solved.delay, delay_error=solved.delay_var, delay_var=variance
+    )
+    return moved._replace(laws=laws, slow=slow), solved
+
+
+def _slow(data: Columns, inverses: tuple[Inverse, ...], solved: Solved) -> Slow:
+    """Where errors have wandered."""
+    left = data.after(solved.terms, solved.delay)
+    mean, error, kept = np.zeros_like(left), np.zeros_like(left), np.ones(left.shape[1])
+    for channel, own in enumerate(inverses):
+        mean[channel], error[channel] = own.smooth(own.weight * left[channel]), own.uncertain()
+        if channel == data.ranging:
+            kept -= own.smooth(own.weight)
+    return Slow(mean, error, kept)
 
 
 def _errors(data: Columns, state: State) -> tuple[Errors, Array]:
     """Expected squares of what is left, and what is left."""
-    after = data.after(state.terms, state.delay)
+    after, slow = data.after(state.terms, state.delay), state.slow
+    unsure = np.repeat(state.delay_error, data.counts)
+    if slow is not None:
+        after -= data.at.seen * slow.mean
+        unsure *= slow.left**2
     square = after**2
     if data.ranging >= 0:
-        unsure = np.repeat(state.delay_error, data.counts)
         square[data.ranging] += data.at.seen[data.ranging] * unsure
+    if slow is not None:
+        square += data.at.seen * slow.error
     return Errors(after, square, data.at), after
 
 
@@ -182,15 +274,16 @@ def _start(data: Columns, prior: Array, *, robust: bool) -> State:
     terms, none = np.zeros(len(prior)), np.zeros(len(data.starts))
     for _ in range(_START_STEPS):
         left = data.after(terms, none)
-        sd = _spread(left, seen)[:, None]
+        sd = spread(left, seen)[:, None]
         weight = seen / (sd * np.maximum(np.abs(left), _NEARLY * sd))
         terms = solve(data.sums(weight, prior), 0.0).terms
-    sd = _spread(data.after(terms, none), seen)
+    sd = spread(data.after(terms, none), seen)
     variance = float(sd[data.ranging] ** 2) if data.ranging >= 0 else 0.0
-    return State(terms, none, none, variance, first_laws(data.channels, sd, robust=robust))
+    laws = first_laws(data.channels, sd, robust=robust)
+    return State(terms, none, none, variance, laws, Wander(0.0 * sd, 0.0 * sd))
 
 
-def _spread(left: Array, seen: Array) -> Array:
+def spread(left: Array, seen: Array) -> Array:
     """(k,) robust standard deviation of residuals (k, m) where seen; 1 where nothing was."""
     rows = [np.abs(row[mask > 0.0]) for row, mask in zip(left, seen, strict=True)]
     return np.array([max(_MAD * np.median(row), 1e-9) if row.size else 1.0 for row in rows])
@@ -202,14 +295,12 @@ class Packing(NamedTuple):
     Attributes:
         terms: (n,) their standard deviations, about.
         delay: scale of delays, m.
-        targets: number of delays.
-        laws: whose numbers are sought.
+        model: a state whose shapes, and whose numbers that are not sought, all others have.
     """
 
     terms: Array
     delay: float
-    targets: int
-    laws: Laws
+    model: State
 
     def pack(self, state: State) -> Array:
         """As a vector."""
@@ -230,22 +321,23 @@ class Packing(NamedTuple):
 
     def unpack(self, vector: Array) -> State:
         """From a vector, brought back into bounds."""
-        sizes = (len(self.terms), self.targets, self.targets, *(len(self.laws.sd),) * 3)
+        model, targets = self.model.laws, len(self.model.delay)
+        sizes = (len(self.terms), targets, targets, *(len(model.sd),) * 3)
         terms, delay, error, sd, share, wide, rest = np.split(vector, np.cumsum(sizes))
         laws = replace(
-            self.laws,
+            model,
             sd=np.exp(sd),
             tail_share=share,
             tail_sd=np.exp(wide),
             wrong=rest[:2],
             place_m=float(np.exp(rest[2])),
             late_s=float(rest[3]),
-            late_sd_s=float(rest[4]) if self.laws.late_sd_s else 0.0,
+            late_sd_s=float(rest[4]) if model.late_sd_s else 0.0,
         ).bounded()
-        return State(
-            terms * self.terms,
-            delay * self.delay,
-            np.maximum(error, 0.0) * self.delay**2,
-            float(max(rest[5], 0.0)) * self.delay**2,
-            laws,
+        return self.model._replace(
+            terms=terms * self.terms,
+            delay=delay * self.delay,
+            delay_error=np.maximum(error, 0.0) * self.delay**2,
+            delay_var=float(max(rest[5], 0.0)) * self.delay**2,
+            laws=laws,
         )

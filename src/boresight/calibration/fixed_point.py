@@ -39,7 +39,9 @@ def fixed_point(
     Returns:
         The point after the last plain step, and whether the tolerance was met.
     """
-    x, points, moves, least = start, [], [], np.inf
+    x, least = start, np.inf
+    points: list[Array] = []
+    moves: list[Array] = []
     for _ in range(most):
         image = step(x)
         move = image - x

@@ -58,6 +58,10 @@ class Laws:
         """No wrong times: what they explained, noise and wrong places explain."""
         return replace(self, wrong=self.wrong * (1.0, 0.0), late_s=0.0, late_sd_s=0.0)
 
+    def no_finer(self, sd: Array) -> "Laws":
+        """With narrow laws of these standard deviations (k,) or more."""
+        return replace(self, sd=np.maximum(self.sd, sd)).bounded()
+
     def bounded(self) -> "Laws":
         """Brought back to where laws can be."""
         if not self.robust:

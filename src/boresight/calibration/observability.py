@@ -4,6 +4,16 @@ Judged by where the targets flew, not by what was estimated: the information of 
 how large each may be, has directions along which the plots shrink what was believed, and directions
 along which they do not. What a reference or a transponder does wrong it does for minutes, so a
 target counts as a limited number of independent pairs, however often it was seen.
+
+A term that is told may still be told badly, because others can stand in for it. That is judged by
+the covariance clustered by target: hardly separable is a term that keeps less than a quarter of the
+information it would have if the others were known [belsley1980: variance inflation], with the terms
+that its estimate is correlated with. A range gain costs a range bias more than that even where
+targets are spread evenly over the area (a ninth is kept), so those two may keep a twenty-fifth.
+Forty aircraft spread evenly cross these limits less than once in a hundred; the limits were set
+beside two recordings on which the terms named were known to trade.
+
+    [belsley1980] David A. Belsley, Edwin Kuh and Roy E. Welsch, "Regression Diagnostics"
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,9 +29,9 @@ Array = Any
 _WORTH = 30.0  # independent pairs that a target is worth at most
 _SHRUNK = 25.0  # prior variance over posterior: told if the plots shrink the sd to a fifth
 _BELIEVED = 0.5  # of a term's variance: if more is believed than measured, it is not observed
-_COST = 3.0  # of a term's sd, the others being unknown: hardly separable from there on
-_COST_RANGING = 4.5  # a gain costs a bias 3.0 even where targets are spread evenly over the area
-_COMPANY = 0.55  # of a term's largest correlation: others below it are not named with it
+_COST = 2.0  # of a term's sd, the others being unknown: hardly separable from there on
+_COST_RANGING = 5.0  # the same of range bias and gain
+_COMPANY = 0.5  # correlation from which on terms are named together
 _RANGING = {"range_bias_m", "range_gain_m_per_km"}
 _PART = 0.15  # of a direction's largest weight: terms below it are not named
 
@@ -81,46 +91,60 @@ def _hardly(
     sd = np.sqrt(np.diag(cov))
     correlation = cov / np.outer(sd, sd)
     cost = np.sqrt(np.diag(np.linalg.inv(correlation)))
+    limit = np.array([_COST_RANGING if term in _RANGING else _COST for term in terms])
+    dear = observable & (cost >= limit)
+    near = np.abs(correlation) * np.outer(observable, observable)
     found: list[Direction] = []
-    for i in np.argsort(-cost, kind="stable"):
-        limit = _COST_RANGING if terms[i] in _RANGING else _COST
-        if cost[i] < limit or not observable[i]:
-            continue
-        size = np.where(observable, np.abs(correlation[i]), 0.0)
-        size[i] = 0.0
-        others = np.flatnonzero(size >= _COMPANY * size.max())
-        named = {terms[i], *(terms[j] for j in others)}
-        if size.any() and not any(named <= direction.weights.keys() for direction in found):
-            found.append(_group(terms, int(i), others, cov, estimate))
+    for i in np.argsort(-cost / limit, kind="stable"):
+        group = _company(near, dear, int(i))
+        dear[group] = False
+        if len(group) > 1:
+            found.append(_group(terms, group, cov, estimate))
     return found
 
 
-def _group(terms: Sequence[str], i: int, others: Array, cov: Array, estimate: Array) -> Direction:
+def _company(near: Array, dear: Array, i: int) -> Array:
+    """A dear term, and all that are near it, directly or by way of other dear ones."""
+    inside = np.arange(len(dear)) == i
+    for _ in dear:
+        inside = inside | (near[inside & dear] >= _COMPANY).any(0)
+    order = np.argsort(-near[i], kind="stable")
+    return np.array([i, *(k for k in order if inside[k] and k != i)], dtype=int)
+
+
+def _group(terms: Sequence[str], group: Array, cov: Array, estimate: Array) -> Direction:
     """Terms that move together, and what is known of them nevertheless."""
-    sd = np.sqrt(np.diag(cov))
-    correlation = cov[i, others] / (sd[i] * sd[others])
-    order = np.argsort(-np.abs(correlation))
-    others, correlation = others[order], correlation[order]
-    if {terms[i], *(terms[j] for j in others)} == _RANGING and terms[i] != "range_bias_m":
-        i, others = int(others[0]), np.array([i])  # metres are what a reader knows
-    lever = np.linalg.solve(cov[np.ix_(others, others)], cov[others, i])
-    left = np.sqrt(max(cov[i, i] - cov[i, others] @ lever, 0.0))
-    known = estimate[i] - lever @ estimate[others]
-    names, unit = [terms[i], *(terms[j] for j in others)], TERMS[terms[i]].unit
-    combination = _combination(names, lever)
+    names = [terms[k] for k in group]
+    if {*names} == _RANGING:
+        names.sort()  # metres are what a reader knows
+        group = np.array([terms.index(name) for name in names])
+    inner, values = cov[np.ix_(group, group)], estimate[group]
+    sd = np.sqrt(np.diag(inner))
+    correlation = inner[0] / (sd[0] * sd)
+    lever = np.linalg.solve(inner[1:, 1:], inner[1:, 0])
+    left = float(np.sqrt(max(inner[0, 0] - inner[0, 1:] @ lever, 0.0)))
+    most = correlation[1 + np.argmax(np.abs(correlation[1:]))]
+    unit = TERMS[names[0]].unit
     words = (
-        f"{_names(names)} are hardly separable here (correlation {correlation[0]:.2f}): "
-        f"{_word(terms[i])} has a standard deviation of {sd[i]:.2g} {unit}, and "
-        f"would have {left:.2g} {unit} if the others were known. Well known is "
-        f"{combination}: {known:.4g} ± {left:.2g} {unit}."
+        f"{_names(names)} are hardly separable here (correlation {most:.2f}): "
+        f"{_word(names[0])} is known to {_number(sd[0], unit)}, and would be to "
+        f"{_number(left, unit)} if the rest were known. Well known is {_combination(names, lever)}:"
+        f" {_rounded(values[0] - lever @ values[1:], left)} ± {_number(left, unit)}."
     )
-    weights = dict(zip(names, (sd[i], *(correlation * sd[others])), strict=True))
-    return Direction(
-        weights={name: float(weight) for name, weight in weights.items()},
-        observable=True,
-        correlation=float(correlation[0]),
-        words=words,
-    )
+    weights = dict(zip(names, (correlation * sd).tolist(), strict=True))
+    return Direction(weights=weights, observable=True, correlation=float(most), words=words)
+
+
+def _number(value: float, unit: str) -> str:
+    """Two digits and the unit: '120 m', '0.011°'."""
+    digits = np.format_float_positional(value, precision=2, fractional=False, trim="-")
+    return f"{digits}{unit}" if unit == "°" else f"{digits} {unit}"
+
+
+def _rounded(value: float, sd: float) -> str:
+    """A value with as many decimals as its standard deviation has in `_number`."""
+    decimals = 1 - int(np.floor(np.log10(sd))) if sd > 0.0 else 3
+    return f"{value:.{max(decimals, 0)}f}"
 
 
 def _combination(names: Sequence[str], lever: Array) -> str:
@@ -128,7 +152,8 @@ def _combination(names: Sequence[str], lever: Array) -> str:
     if {*names} == _RANGING:
         return f"the range error at {-lever[0]:.0f} km"
     parts = [
-        f"{factor:+.3g} × {_word(name)}" for name, factor in zip(names[1:], -lever, strict=True)
+        f"{'+' if factor < 0.0 else '-'} {_number(abs(factor), '').strip()} × {_word(name)}"
+        for name, factor in zip(names[1:], lever, strict=True)
     ]
     return " ".join([_word(names[0]), *parts])
 
@@ -155,5 +180,5 @@ def _word(term: str) -> str:
 def _sum(weights: dict[str, float]) -> str:
     """'100 m of range bias together with -2 m/km of range gain'."""
     return " together with ".join(
-        f"{weight:.3g} {TERMS[term].unit} of {_word(term)}" for term, weight in weights.items()
+        f"{_number(weight, TERMS[term].unit)} of {_word(term)}" for term, weight in weights.items()
     )

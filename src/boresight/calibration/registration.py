@@ -1,6 +1,7 @@
 """Registration: the systematic errors of a radar from plots whose targets' places are known.
 
-residual = effects of the terms + delay of the target's transponder (range) + noise
+residual = effects of the terms + delay of the target's transponder (range)
+               + what wanders along the target + noise
 
 The noise is a narrow and a wide normal law per channel; some pairs are no measurement at all. All
 of it is found together by expectation-maximisation with a random effect for each target, from a
@@ -42,7 +43,8 @@ class Registration:
         noise: of the plots.
         outlier: (m,) probability that a pair is no measurement of its target.
         delay_m: (targets,) predicted delay of each transponder; 0 for a target without pairs.
-        after: (m, k) residuals without systematic errors, m and rad; delays are still in.
+        after: (m, k) residuals without systematic errors, m and rad; delays, and what wanders, are
+            still in.
         remarks: sentences for the reader.
     """
 
@@ -65,7 +67,8 @@ def register(
         pairs: plots beside where their targets were.
         terms: of `TERMS`, to be estimated; all others are taken as zero.
         robust: heavy tails and outliers; without it every channel is normal.
-        delays: a random delay of range for each target.
+        delays: a random delay of range for each target, and errors that wander along it; without
+            it every pair errs by itself.
 
     Raises:
         DataError: no pairs.
@@ -87,18 +90,9 @@ def register(
         noise=_noise(found, pairs.channels),
         outlier=found.in_order(found.classes.outlier),
         delay_m=found.delay_m(len(pairs.names)),
-        after=_left(found, pairs),
+        after=np.where(np.isnan(pairs.z), np.nan, found.in_order(found.whole().T)),
         remarks=_remarks(found),
     )
-
-
-def _left(found: Fit, pairs: Pairs) -> Array:
-    """(m, k) residuals without terms; delays are in, and NaN where nothing was measured."""
-    left = found.in_order(found.after.T)
-    if "range_m" in pairs.channels:
-        delay = found.delay_m(len(pairs.names))
-        left[:, pairs.channels.index("range_m")] += delay[pairs.target]
-    return np.where(np.isnan(pairs.z), np.nan, left)
 
 
 def _spread(found: Fit, terms: tuple[str, ...]) -> Sandwich:
@@ -115,7 +109,7 @@ def _each(
     """Every term with its interval; infinite where there are no degrees of freedom."""
     from scipy.stats import t
 
-    alone = found.information(delays=False).sum(0) + np.diag(found.prior)
+    alone = found.alone() + np.diag(found.prior)
     independent = np.sqrt(np.diag(np.linalg.inv(alone)))
     sd = np.sqrt(np.diag(spread.cov))
     half = np.array(
@@ -136,24 +130,28 @@ def _each(
 def _noise(found: Fit, channels: tuple[str, ...]) -> NoiseFound:
     """Laws in the units of the door."""
     laws, known = found.state.laws, len(found.pairs.starts) >= _FEWEST
-    robust = found.robust_sd()
-    by_door, single = {}, dict.fromkeys(("range_m", "azimuth_deg", "elevation_deg"))
+    level, whole = found.robust_sd(found.level()), found.robust_sd(found.whole())
+    slow = np.sqrt(found.state.wander.variance)
+    single: dict[str, float] = {}
+    left: dict[str, float] = {}
+    by_door = {}
     for i, channel in enumerate(channels):
         if not found.pairs.at.seen[i].any():
             continue
         door, unit = channel.replace("_rad", "_deg"), _DOOR[channel]
-        by_door[door] = Law(
-            float(laws.sd[i] * unit), float(laws.tail_share[i]), float(laws.tail_sd[i] * unit)
-        )
-        single[door] = float(robust[i] * unit)
+        narrow, wide = (float(np.hypot(sd[i], slow[i]) * unit) for sd in (laws.sd, laws.tail_sd))
+        by_door[door] = Law(narrow, float(laws.tail_share[i]), wide)
+        single[door], left[door] = float(level[i] * unit), float(whole[i] * unit)
     nothing = float("nan")
     return NoiseFound(
-        range_m=nothing if single["range_m"] is None else single["range_m"],
-        azimuth_deg=nothing if single["azimuth_deg"] is None else single["azimuth_deg"],
-        elevation_deg=single["elevation_deg"],
+        range_m=single.get("range_m", nothing),
+        azimuth_deg=single.get("azimuth_deg", nothing),
+        elevation_deg=single.get("elevation_deg"),
         target_range_m=float(np.sqrt(found.state.delay_var)) if known else nothing,
         outlier_share=laws.outlier_share if laws.robust else 0.0,
         laws=by_door,
+        residual_range_m=left.get("range_m", nothing),
+        residual_azimuth_deg=left.get("azimuth_deg", nothing),
     )
 
 
@@ -165,6 +163,22 @@ def _remarks(found: Fit) -> tuple[str, ...]:
             f"{len(found.pairs.starts)} target(s): how much targets differ cannot be told, so no "
             "interval is given; the covariance is what was believed before"
         )
+    remarks += _wandering(found)
     if not found.converged:
         remarks.append("the fit had not settled when it was stopped")
     return tuple(remarks)
+
+
+def _wandering(found: Fit) -> list[str]:
+    """Whose errors are alike from plot to plot, and for how long."""
+    wander = found.state.wander
+    said = []
+    for channel, variance, time_s in zip(found.pairs.channels, *wander, strict=True):
+        name, unit = channel.split("_")[0], "m" if channel == "range_m" else "deg"
+        if variance:
+            size = float(np.sqrt(variance) * _DOOR[channel])
+            said.append(
+                f"errors of {name} wander along a target by {size:.2g} {unit} and stay alike for "
+                f"about {time_s:.2g} s: many plots of one target are worth few"
+            )
+    return said

@@ -68,10 +68,13 @@ class NoiseFound:
     """What is left when the systematic errors are taken out; robust standard deviations.
 
     Attributes:
-        range_m, azimuth_deg, elevation_deg: of single plots; None where not measured.
+        range_m, azimuth_deg, elevation_deg: of single plots about the level of their target, what
+            wanders along it included; None where not measured.
         target_range_m: of the delay from transponder to transponder.
         outlier_share: of pairs that are no measurement of their target.
         laws: by `range_m`, `azimuth_deg`, `elevation_deg`: the law fitted to the residuals.
+        residual_range_m, residual_azimuth_deg: of all that is left, delays included, outliers
+            aside; NaN if not told.
     """
 
     range_m: float
@@ -80,6 +83,8 @@ class NoiseFound:
     target_range_m: float
     outlier_share: float
     laws: dict[str, Law] = field(default_factory=dict)
+    residual_range_m: float = float("nan")
+    residual_azimuth_deg: float = float("nan")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
