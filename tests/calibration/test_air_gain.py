@@ -1,5 +1,7 @@
 """What the air alone makes of range: a line fitted to its delay, worked out apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from turning_radar import record
@@ -46,6 +48,16 @@ def test_it_is_the_slope_of_the_delay_over_range():
     slope, _ = np.polyfit(range_m / 1e3, delay, 1)
     found = air_gain_m_per_km(level_flight(range_m, height), SITE)
     assert found == pytest.approx(slope, rel=2e-3)  # its ray is not bent upward
+
+
+@pytest.mark.parametrize("up_m", [1_000.0, 3_000.0])
+def test_a_radar_and_its_targets_higher_up_have_thinner_air(up_m):
+    """Refractivity falls by e in 7,350 m; that the Earth is larger up there does not matter."""
+    range_m, height = np.linspace(15e3, 60e3, 60), 5_000.0
+    low = level_flight(range_m, height)
+    high = replace(low, height_m=low.height_m + up_m)
+    found = air_gain_m_per_km(high, replace(SITE, height_m=up_m))
+    assert found == pytest.approx(air_gain_m_per_km(low, SITE) * np.exp(-up_m / 7_350.0), rel=2e-3)
 
 
 def test_many_pairs_give_what_a_part_of_them_gives():

@@ -18,11 +18,30 @@ def drawn(rng, sizes, own, mean=0.0):
 
 @pytest.mark.parametrize("mean", [180.0, -179.95, 90.0])
 def test_an_angle_may_lie_anywhere_on_the_circle(mean):
-    found = pool(*drawn(np.random.default_rng(0), [4] * 30, 0.1, mean), STEP)
+    angle, sd, target = drawn(np.random.default_rng(0), [4] * 30, 0.1, mean)
+    found = pool(np.angle(np.exp(1j * angle)), sd, target, STEP)
     assert -180.0 < found.value <= 180.0
     off = (found.value - mean + 180.0) % 360.0 - 180.0
     assert abs(off) < 4.0 * found.sd < 0.2
     assert np.abs(found.left).max() < 1.0
+
+
+def test_a_mean_is_counted_on_from_where_it_began():
+    found = pool(*drawn(np.random.default_rng(0), [4] * 30, 0.1, 2.0), STEP)
+    on = found.beyond(179.0)
+    assert on.value == pytest.approx(found.value - 181.0)
+    assert (on.sd, on.half) == (found.sd, found.half)
+    assert on.term().ci95 == pytest.approx((on.value - on.half, on.value + on.half))
+
+
+def test_an_angle_is_as_uncertain_as_its_rounding_at_least():
+    """A number that is rounded to steps errs by up to half of one, all errors alike."""
+    rng = np.random.default_rng(6)
+    exact = rng.uniform(-20.0, 20.0, 100_000)
+    scatter = np.std(np.round(exact / STEP) * STEP - exact)  # good to 0.2 %
+    few = np.radians(np.round(rng.normal(0.0, 0.1, 200) / STEP) * STEP)
+    found = pool(few, np.full(200, 1e-9), np.arange(200), STEP)
+    assert found.spread == pytest.approx(scatter, rel=0.01)
 
 
 def test_wild_angles_count_for_little():

@@ -172,15 +172,15 @@ def test_a_channel_that_only_some_plots_have():
     assert np.isfinite(known).any()
 
 
-def plots(seed, targets, turns, *, step=0.0, at=np.inf, tail=0.0, level=2.0):
-    """Times, targets and errors of slots that each hold one target after another, 200 turns each.
+def plots(seed, targets, turns, *, step=0.0, at=np.inf, tail=0.0, level=2.0, seen=200):
+    """Times, targets and errors of slots of one target after another, `seen` turns each.
 
     Noise has unit variance, of normal laws or with a share `tail` of three times the width.
     """
     rng = np.random.default_rng(seed)
     slot = np.repeat(np.arange(targets), turns)
     time = TURN_S * np.tile(np.arange(turns), targets) + rng.uniform(0.0, TURN_S, targets)[slot]
-    life = (np.tile(np.arange(turns), targets) + rng.integers(0, 200, targets)[slot]) // 200
+    life = (np.tile(np.arange(turns), targets) + rng.integers(0, seen, targets)[slot]) // seen
     target = slot * (life.max() + 1) + life
     wide = np.where(rng.random(len(time)) < tail, 3.0, 1.0) / np.sqrt(1.0 + 8.0 * tail)
     own = level * rng.normal(size=target.max() + 1)
@@ -222,6 +222,19 @@ def test_a_step_is_known_from_five_turns_after_it():
         time, target, y = plots(seed, 8, 206, step=3.0, at=at)
         found += len(steps.find(time, target, y)) > 0
     assert found >= 90
+
+
+def test_targets_that_are_seen_for_a_few_turns_tell_a_step_all_the_same():
+    """Twenty turns each, 14 at a time, and a step of 1.2 standard deviations.
+
+    A mean of few plots before a turn must be weighed as one: then 73 of 100 are found, and else 45.
+    If 73 % are found in the long run, fewer than 60 of 100 would have a chance of 0.2 %.
+    """
+    at, found = 600.0, 0
+    for seed in range(100):
+        times = steps.find(*plots(seed, 14, 300, step=1.2, at=at, level=5.0, seen=20))
+        found += np.any(np.abs(times - at) <= steps.AFTER * TURN_S)
+    assert found >= 60
 
 
 @pytest.mark.slow
