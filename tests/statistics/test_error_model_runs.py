@@ -145,4 +145,4 @@ def test_a_false_alarm_comes_once_in_thousands_of_references(set2):
     share = np.diagonal(found.error_cov, 0, -2, -1) / SIGMA**2
     alarms = np.count_nonzero(share[:, 5:] > 50.0)
     # 594,000 references; a count of Poisson's kind, mean 63: outside once in 10,000.
-    assert 35 <= alarms <= 96
+    assert 34 <= alarms <= 96
