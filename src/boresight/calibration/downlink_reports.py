@@ -17,6 +17,19 @@ NEAREST_M = 10_000.0  # nearer, 100 m of range or height can turn a direction by
 USUAL_SCAN_S, SHORTEST_SCAN_S = 4.0, 0.5
 DUPLICATE_SCANS = 0.125  # two plots of one aircraft closer than this are one reply seen twice
 
+MEANINGS = {  # of these plots and, further down, of the stretches of `calibration.stretches`
+    "no address": "no 24-bit address: nothing says which aircraft's track was downlinked",
+    "no height": "no valid flight level",
+    "too near": f"nearer than {NEAREST_M / 1e3:g} km, where errors of range turn a direction",
+    "duplicate": "a second reply of one aircraft in a scan",
+    "turn": "in a turn: the downlinked roll says so",
+    "short": "in a stretch between gaps or turns that is too short",
+    "slow": "of an aircraft too slow to have a course",
+    "few tracks": "in a stretch with too few downlinked tracks",
+    "wrong tracks": "in a stretch whose downlinked speeds are not those of the plots",
+    "changing course": "in a stretch along which the downlinked track changes",
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Reports:

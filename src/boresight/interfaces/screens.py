@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from boresight.tracking.result import Comparison, Gain, TrackingResult
 
 WIDE = 100
+NARROW = 80
 WORST = 8
 LONG = 4  # values of a list that are all shown
 
@@ -25,6 +26,7 @@ def table(heading: str, *heads: str, left: int = 1) -> "Table":
 
     table = Table(title=heading, box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     table.title_justify, table.title_style = "left", "bold"
+    table.min_width = min(len(heading), NARROW)  # or a title breaks where a table is small
     for index, head in enumerate(heads):
         side: Literal["left", "right"] = "left" if index < left else "right"
         table.add_column(head, justify=side, no_wrap=True, header_style="dim")

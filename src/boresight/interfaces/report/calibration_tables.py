@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from boresight.interfaces.report.calibration_findings import Finding, findings
 from boresight.interfaces.report.calibration_scale import Typical
+from boresight.interfaces.report.calibration_words import meaning
 from boresight.interfaces.report.words import (
     Cell,
     clock,
@@ -163,8 +164,10 @@ def dropped(calibration: "Calibration") -> str:
             text_cell(name.replace("_", " ")),
             number_cell(each),
             Cell(percent(each, total), is_figure=True),
+            text_cell(meaning(calibration, name)),
         ]
         for name, each in sorted(counts.items(), key=lambda item: -item[1])
     ]
     caption = f"Plots and reports that made no pair, beside {figure(calibration.pairs)} pairs"
-    return table(caption, ["reason", "number", "share"], rows, name="dropped-table")
+    heads = ["reason", "number", "share", "meaning"]
+    return table(caption, heads, rows, name="dropped-table")

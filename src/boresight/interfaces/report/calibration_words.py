@@ -33,9 +33,18 @@ REFERENCES = {
     "them, are held against the true track that the aircraft send down. That shows a rotation of "
     "the whole picture, so the azimuth bias, and nothing of range or time.",
 }
-NAMES = {"adsb": "ADS-B", "downlink": "tracks sent down", "table": "a table of positions"}
+NAMES = {"adsb": "ADS-B", "downlink": "downlinked tracks", "table": "a table of positions"}
 
 
 def unit(calibration: "Calibration") -> str:
     """What is compared: pairs of a plot and a position or, without those, straight stretches."""
     return "stretches" if calibration.reference == "downlink" else "pairs"
+
+
+def meaning(calibration: "Calibration", reason: str) -> str:
+    """Why plots of a reason made no pair, in words; nothing where the reason says all."""
+    from boresight.calibration.downlink_reports import MEANINGS as OF_DOWNLINK
+    from boresight.calibration.matching import MEANINGS as OF_PAIRING
+
+    own = OF_DOWNLINK if calibration.reference == "downlink" else {}
+    return (OF_PAIRING | own).get(reason, "")
