@@ -52,6 +52,29 @@ def flights(rng, pairs, targets, *, near_m=10e3, far_m=250e3):
     return target, (middle[:, target] + way[:, target] * when).T, way[:, target].T
 
 
+def scans(rng, targets, each, *, scan_s=8.0, far_m=250e3):
+    """(target, position, velocity), (times): straight flights seen at every scan of a radar."""
+    reach, angle = rng.uniform(30e3, far_m, targets), rng.uniform(0.0, 2.0 * np.pi, targets)
+    heading, speed = rng.uniform(0.0, 2.0 * np.pi, targets), rng.uniform(120.0, 260.0, targets)
+    middle = np.stack(
+        [reach * np.cos(angle), reach * np.sin(angle), rng.uniform(3e3, 11e3, targets)]
+    )
+    way = np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros(targets)])
+    target, when = np.repeat(np.arange(targets), each), scan_s * np.tile(np.arange(each), targets)
+    where = middle[:, target] + way[:, target] * (when - 0.5 * scan_s * each)
+    return (target, where.T, way[:, target].T), when
+
+
+def wandered(rng, targets, each, sd, alike):
+    """(targets x each,) errors that are alike from scan to scan: first-order autoregression."""
+    out = np.empty((targets, each))
+    out[:, 0] = sd * rng.normal(size=targets)
+    for scan in range(1, each):
+        fresh = sd * np.sqrt(1.0 - alike**2) * rng.normal(size=targets)
+        out[:, scan] = alike * out[:, scan - 1] + fresh
+    return out.ravel()
+
+
 def scattered(rng, pairs, *, near_m=10e3, far_m=250e3):
     """As `flights`, but every pair is a target of its own."""
     return flights(rng, pairs, pairs, near_m=near_m, far_m=far_m)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from radar_worlds import SIX, Noise, flights, world
 
+from boresight.calibration.observability import observability
 from boresight.calibration.registration import register
 
 TARGETS = 20
@@ -113,6 +114,18 @@ def test_an_elevation_bias_without_elevations_is_not_observable(given):
     assert found.noise.elevation_deg is None
 
 
+@pytest.mark.parametrize(("targets", "told"), [(3, False), (300, True)])
+def test_many_plots_of_few_targets_are_worth_few(targets, told):
+    """30,000 plots, each a fifth of what is believed: enough alone, but three targets made them."""
+    term = ("range_bias_m",)
+    each = 30_000 // targets
+    one = np.array([[0.2 / 1_000.0**2]])  # of one plot, over the scale of a range bias
+    found = observability(
+        term, np.array([each * one] * targets), np.full(targets, each), 1.0 * one, np.zeros(1)
+    )
+    assert found.observable.tolist() == [told]
+
+
 def alarms(seeds, pairs):
     """How many rich worlds have a term called not observable, or hardly separable."""
     hidden = hard = 0
@@ -139,10 +152,12 @@ def test_terms_that_are_nearly_one_are_named_together_with_what_is_known():
     """Ranges of 100 to 110 km only: bias and gain are told, but hardly from one another."""
     place = flights(np.random.default_rng(2), 4_000, 40, near_m=130e3, far_m=150e3)
     found = register(world(2, place=place, noise=Noise(range_m=20.0, azimuth_deg=0.02))[0], SIX)
-    (direction,) = [d for d in found.directions if "range_gain_m_per_km" in d.weights]
+    (direction,) = found.directions  # one for a combination, however many terms it has
     assert found.terms["range_gain_m_per_km"].observable
     assert direction.observable
     assert direction.correlation < -0.95
     assert {*direction.weights} == {"range_bias_m", "range_gain_m_per_km"}
     assert "hardly separable" in direction.words
     assert "range error at" in direction.words
+    assert "e+" not in direction.words
+    assert " °" not in direction.words

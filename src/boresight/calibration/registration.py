@@ -178,7 +178,12 @@ def _wandering(found: Fit) -> list[str]:
         if variance:
             size = float(np.sqrt(variance) * _DOOR[channel])
             said.append(
-                f"errors of {name} wander along a target by {size:.2g} {unit} and stay alike for "
-                f"about {time_s:.2g} s: many plots of one target are worth few"
+                f"Errors of {name} wander along a target, by {_two(size)} {unit}, and stay alike "
+                f"for about {_two(time_s)} s: many plots of one target are worth few."
             )
     return said
+
+
+def _two(value: float) -> str:
+    """Two digits: '130', '0.036'."""
+    return np.format_float_positional(value, precision=2, fractional=False, trim="-")

@@ -1,9 +1,15 @@
-"""Errors of one target that are alike from scan to scan, and what they leave of the information.
+"""Errors of one target that are alike from scan to scan, and what its plots are worth then.
 
 A height that is read in steps, a tracker that smooths, a reference that lags: their errors wander
 slowly while the target flies. In each channel they are taken as an Ornstein-Uhlenbeck process along
 the target, at the true times of its plots, beside the noise of single plots. The inverse covariance
 of the process is tridiagonal, so that of both together costs a few operations for each pair.
+
+It serves to tell what an outlier is (one about where the process has wandered), and to lower a
+target's weights until they tell of a level what they can. The terms are not found by the whole
+inverse covariance: that would be a fourth better if the law were exactly this one, but it lives on
+quick changes, whose noise looks smallest where a model fits worst. On a recording of an airport's
+surface it moved the range bias by three of its standard deviations.
 
     [rue2005] Håvard Rue and Leonhard Held, "Gaussian Markov Random Fields: Theory and Applications"
     [patterson1971] H. D. Patterson and R. Thompson, "Recovery of inter-block information when
@@ -160,14 +166,18 @@ def wandering(residuals: Residuals) -> tuple[float, float]:
     def loss(numbers: Array) -> float:
         return residuals.loss(*(units * np.exp(numbers)))[0]
 
+    none = residuals.loss(0.0, 1.0)[0]
+    start = min((np.log(at) for at in product(_RATIOS, _SCANS)), key=loss)
+    if loss(start) >= none:
+        return 0.0, 0.0
     best = minimize(
         loss,
-        min((np.log(at) for at in product(_RATIOS, _SCANS)), key=loss),
+        start,
         method="Nelder-Mead",
         bounds=[(None, np.log(MOST)), (0.0, np.log(_LONGEST))],
         options={"xatol": _CLOSE, "fatol": _CLOSE},
     )
-    if residuals.loss(0.0, 1.0)[0] - best.fun < _TELLING:
+    if none - best.fun < _TELLING:
         return 0.0, 0.0
     variance, time_s = units * np.exp(best.x)
     return float(variance * residuals.loss(variance, time_s)[1]), float(time_s)
