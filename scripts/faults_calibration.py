@@ -1,4 +1,4 @@
-"""Planted faults in calibration, in what it says of a radar, and in what takes that on."""
+"""Planted faults in systematic errors, in what takes them on, and in pairing and counting."""
 
 from faults import faults
 
@@ -20,17 +20,6 @@ JUDGES = {
     "calibration/same_day": ("calibration/test_pairing", "calibration/test_reference_faults"),
     "calibration/detection": ("calibration/test_detection",),
     "calibration/false_plots": ("calibration/test_detection",),
-    "calibration/residuals": ("calibration/test_residuals",),
-    "calibration/bins": ("calibration/test_residuals",),
-    "calibration/levels": ("calibration/test_levels", "calibration/test_stability"),
-    "calibration/steps": ("calibration/test_stability",),
-    "calibration/stability": ("calibration/test_stability",),
-    "calibration/air": ("calibration/test_air_gain",),
-    "calibration/downlink": ("calibration/test_downlink",),
-    "calibration/stretches": ("calibration/test_downlink",),
-    "calibration/pooled": ("calibration/test_pooled",),
-    "calibration/correcting": ("calibration/test_kept_and_corrected",),
-    "calibration/file": ("calibration/test_kept_and_corrected",),
 }
 FAULTS = (
     *faults(
@@ -204,107 +193,5 @@ FAULTS = (
         ('kinds["unidentified"][near] = False', "pass"),
         ("np.asarray(time_s) * _FASTEST_MPS", "np.asarray(time_s) * 0.0"),
         ("(last - first) / pairing.scan_s", "last - first"),
-    ),
-    *faults(
-        "calibration/residuals.py",
-        ('("azimuth", "deg", 180.0 / np.pi)', '("azimuth", "deg", np.pi / 180.0)'),
-        ("MAD_TO_SD = 1.4826", "MAD_TO_SD = 0.6745"),
-        ('out["range_m"] - delay_m[', 'out["range_m"] + delay_m['),
-        ("registration.outlier < 0.5", "registration.outlier < 1.5"),
-        ('FORMULAS["azimuth_rad"](p, p)) % 360.0', 'FORMULAS["azimuth_rad"](p, p))'),
-    ),
-    *faults(
-        "calibration/bins.py",
-        ('side="right") - 1', 'side="left") - 1'),
-        ("edges[members[-1] + 1]", "edges[members[-1]]"),
-        ("held.sum() >= rows", "held.sum() > rows"),
-        ("first = int(np.floor(low / width))", "first = int(np.rint(low / width))"),
-    ),
-    *faults(
-        "calibration/levels.py",
-        ("1.0 - chance / 2.0", "1.0 - chance"),
-        ("2.0 * stdtr(", "stdtr("),
-        ("lost = 1.0 - np.sqrt(within", "lost = 1.0 - (within"),
-        ("within * float(np.mean(1.0 / total))", "within * float(np.mean(total))"),
-        ("max(len(y) - len(first), 1)", "len(y)"),
-    ),
-    *faults(
-        "calibration/steps.py",
-        ("1.0 / AFTER + 1.0 / (r - b)", "1.0 / AFTER - 1.0 / (r - b)"),
-        ("summed[r] - summed[b]) / (r - b)", "summed[r] - summed[b]) / BEFORE"),
-        ("np.cumsum(gain[::-1])[::-1]", "np.cumsum(gain)"),
-        ("medians(y, target, int(target[-1]) + 1)[target]", "np.median(y)"),
-        ("_MOST = 3.5", "_MOST = 35.0"),
-        ("start + period * _peaks(", "period * _peaks("),
-    ),
-    *faults(
-        "calibration/stability.py",
-        ("_HOUR_S = 3_600.0", "_HOUR_S = 60.0"),
-        ("who[rows], each - rest", "who[rows], each"),
-        ("agree &= ~worst", "agree &= worst"),
-        ("[1:] < _CHANCE]", "[1:] > _CHANCE]"),
-        ("return at, _trend(pairs, y, at)", "return at, found"),
-        ("good &= ~(off >", "good &= (off >"),
-    ),
-    *faults(
-        "calibration/air.py",
-        ("(from_middle @ from_middle)", "(range_m @ range_m)"),
-        ("1_000.0 * (from_middle", "(from_middle"),
-        ("pairs.height_m[rows], site.height_m", "pairs.height_m[rows], 0.0"),
-    ),
-    *faults(
-        "calibration/downlink.py",
-        ("reports.turned(-rough.value)", "reports.turned(rough.value)"),
-        ("(STEP_DEG / 2) ** 2 / 3", "STEP_DEG / 2"),
-        ("half = 0.5 * np.sin(2.0 *", "half = np.sin(2.0 *"),
-        ("np.arctan2(east, north)", "np.arctan2(north, east)"),
-        ("np.cos(azimuth) - np.sin(azimuth) * half", "np.cos(azimuth) + np.sin(azimuth) * half"),
-        (
-            "np.degrees(np.arctan2(centre[:, 0], centre[:, 1]))",
-            "np.degrees(np.arctan2(centre[:, 1], centre[:, 0]))",
-        ),
-        ("float(one.value - other.value)", "float(other.value - one.value)"),
-        ("velocity[good, 0] > 0.0", "velocity[good, 1] > 0.0"),
-    ),
-    *faults(
-        "calibration/stretches.py",
-        ("np.abs(np.nan_to_num(reports.roll_deg))", "np.nan_to_num(reports.roll_deg)"),
-        ("np.sqrt(1 + 9 + 9 + 1)", "np.sqrt(1 + 3 + 3 + 1)"),
-        ("_axes(centre, velocity, site)", "_axes(0.0 * centre, velocity, site)"),
-        ("* compass[0] + np.cos(track)", "* compass[0] - np.cos(track)"),
-        ("turned = -_to_the_right(", "turned = _to_the_right("),
-        ("total(np.sin(turned)), total(np.cos(turned))", "total(turned), total(turned**0)"),
-        ("/ (count - 2) / reach2", "/ reach2"),
-        (
-            "left[:, 0] * enu[:, 1] - left[:, 1] * enu[:, 0]",
-            "left[:, 0] * enu[:, 0] + left[:, 1] * enu[:, 1]",
-        ),
-    ),
-    *faults(
-        "calibration/pooled.py",
-        ("step_deg**2 / 12", "step_deg**2"),
-        ("np.degrees(wrap(angle - about))", "np.degrees(angle - about)"),
-        ("np.angle(np.exp(1j * angle).sum())", "angle.mean()"),
-        ("np.maximum(far, 1.0)", "1.0"),
-        ("> _MEDIAN_CHI2", "> 1.0"),
-        ("start + self.value", "self.value"),
-    ),
-    *faults(
-        "calibration/correcting.py",
-        ('- errors.value("time_bias_s")', '+ errors.value("time_bias_s")'),
-        ("np.degrees(clean[", "(clean["),
-        ('"sensor", "") == calibration', '"sensor", "") != calibration'),
-        ('("azimuth_deg", "elevation_deg") if', '("azimuth_deg",) if'),
-    ),
-    *faults(
-        "calibration/file.py",
-        ("eigvalsh(alike).min()", "eigvalsh(alike).max()"),
-        ("np.abs(alike - alike.T)", "np.abs(alike - alike)"),
-        ('document.get("version") != VERSION', 'document.get("version", 0) > VERSION'),
-        (
-            "kept.terms[name].estimate for name in terms]",
-            "term.estimate for term in kept.terms.values()]",
-        ),
-        ("if not isfinite(term.estimate)", "if isinf(term.estimate)"),
     ),
 )

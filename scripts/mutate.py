@@ -20,10 +20,13 @@ from pathlib import Path
 import faults
 import faults_calibration
 import faults_filters
+import faults_registration
 from faults import Fault
 
 ROOT = Path(__file__).resolve().parents[1]
-FAULTS = (*faults.FAULTS, *faults_filters.FAULTS, *faults_calibration.FAULTS)
+_TABLES = (faults, faults_filters, faults_calibration, faults_registration)
+FAULTS = tuple(fault for table in _TABLES for fault in table.FAULTS)
+_JUDGED = faults_calibration.JUDGES | faults_registration.JUDGES
 
 
 def _tests(*names: str) -> tuple[str, ...]:
@@ -64,7 +67,7 @@ JUDGES = {
     "filters/line_of_sight": _tests(
         "laws/test_bent_gaussians", "laws/test_line_of_sight", "laws/test_moving_sensor"
     ),
-    **{prefix: _tests(*names) for prefix, names in faults_calibration.JUDGES.items()},
+    **{prefix: _tests(*names) for prefix, names in _JUDGED.items()},
     "": LAWS,
 }
 # What is compiled is judged so; of the error model's long recursions that is the quicker way too.
