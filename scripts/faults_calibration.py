@@ -17,7 +17,7 @@ JUDGES = {
     "calibration/due": _PAIRED,
     "calibration/screening": ("calibration/test_references", "calibration/test_reference_rules"),
     "calibration/faults": ("calibration/test_reference_faults", "calibration/test_pairing_rules"),
-    "calibration/same_day": ("calibration/test_pairing", "calibration/test_reference_faults"),
+    "calibration/same_day": _PAIRED,
     "calibration/detection": ("calibration/test_detection",),
     "calibration/false_plots": ("calibration/test_detection",),
 }

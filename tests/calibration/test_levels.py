@@ -65,3 +65,26 @@ def test_intervals_hold_the_truth_as_often_as_they_say(own_sd):
         found = estimate(X, y, count, target, np.array([[0.0, 1.0]]))
         missed += abs(found.value[0] - 1.0) > found.half_width()[0]
     assert 4 < missed < 28
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_levels_weigh_what_a_target_tells_against_what_targets_differ_by(seed):
+    """Against the covariance of all rows written out, of targets with one row or two.
+
+    The variances that are estimated are right to some per cent, so the estimates agree to a tenth
+    of their standard deviation.
+    """
+    rng, targets, own_sd = np.random.default_rng(seed), 1_500, 0.2
+    kept = rng.random(2 * targets) < 0.6
+    target, later = np.repeat(np.arange(targets), 2)[kept], np.tile([0.0, 1.0], targets)[kept]
+    count = rng.integers(2, 60, len(target)).astype(float)
+    y = later + own_sd * rng.normal(size=targets)[target]
+    y += rng.normal(size=len(y)) / np.sqrt(count)
+    X = np.column_stack([np.ones(len(y)), later])
+    V = np.diag(1.0 / count) + own_sd**2 * (target[:, None] == target)
+    weighed = np.linalg.solve(V, X)
+    cov = np.linalg.inv(X.T @ weighed)
+    found = estimate(X, y, count, target, np.eye(2))
+    sd = np.sqrt(np.diag(cov))
+    assert np.abs((found.value - cov @ weighed.T @ y) / sd).max() < 0.1
+    assert found.sd == pytest.approx(sd, rel=0.15)

@@ -167,3 +167,16 @@ def test_traffic_to_the_west_is_as_near_its_targets_as_to_the_east(tmp_path):
     found = pair(plots, reference(tmp_path, *(each.reports() for each in west)), SITE)
     assert len(found.pairs) == plots.height
     assert len(found.remarks) == 1  # of the heights
+
+
+def test_times_of_day_sorted_over_midnight_are_put_on_the_plots_day(tmp_path):
+    fleet, plots = sky()
+    reports = pl.concat([each.reports() for each in fleet])
+    plain = pair(plots, reference(tmp_path, reports), SITE)
+    shift = 86_400.0 - 1_200.0  # in the middle of the flights; all times are whole 1/128 s
+    times = (pl.col("time_s") + shift) % 86_400.0
+    sorted_over = reports.with_columns(times).sort("time_s")  # so no row tells of the midnight
+    late = plots.with_columns(pl.col("time_s") + shift)
+    found = pair(late, reference(tmp_path, sorted_over), SITE)
+    np.testing.assert_array_equal(found.pairs.position, plain.pairs.position)
+    assert any("midnight" in remark for remark in found.remarks)

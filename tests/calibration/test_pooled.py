@@ -26,6 +26,13 @@ def test_an_angle_may_lie_anywhere_on_the_circle(mean):
     assert np.abs(found.left).max() < 1.0
 
 
+def test_angles_on_both_sides_of_half_a_turn_have_their_mean_there():
+    angle = np.radians(np.tile([179.8, -179.8], 20))
+    found = pool(angle, np.full(40, 1e-3), np.arange(40), STEP)
+    assert abs(found.value) == pytest.approx(180.0, abs=1e-6)
+    assert np.abs(found.left) == pytest.approx(np.full(40, 0.2))
+
+
 def test_a_mean_is_counted_on_from_where_it_began():
     found = pool(*drawn(np.random.default_rng(0), [4] * 30, 0.1, 2.0), STEP)
     on = found.beyond(179.0)
