@@ -149,6 +149,6 @@ def test_an_estimate_that_is_no_number_is_refused(tmp_path):
     terms = made().terms
     wrong = terms | {"range_bias_m": replace(terms["range_bias_m"], estimate=float("nan"))}
     path = write_calibration(made(terms=wrong), tmp_path / "calibration.toml")
-    with pytest.raises(DataError, match="is not a calibration") as caught):
+    with pytest.raises(DataError, match="is not a calibration") as caught:
         read_calibration(path)
     assert "range_bias_m" in caught.value.why
