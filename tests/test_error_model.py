@@ -1,5 +1,6 @@
 """The error model at the door: what it takes, gives and refuses."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -262,6 +263,20 @@ def test_one_scan_is_corrected_by_its_own_reference_only(simulated):
     same = bs.error_model(z, place, RADAR, dt=1.0, model="kashyap")
     half = (np.linalg.norm(place, axis=-1) - z[..., 0]) / 2  # as sure as a plot, spread 1
     np.testing.assert_allclose(same.error[..., 0], half, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "frame"), [("emekf", "polar"), ("ecmkf", "cartesian")])
+def test_the_papers_filters_say_which_two_steps_they_are(name, frame, simulated):
+    """What the message says, done, is the filter."""
+    truth, plots = simulated
+    with pytest.raises(UsageError, match=f"{name} is two steps") as refused:
+        bs.run(name, MOTION, RADAR, plots)
+    first, second = re.search(r"found = (.*); (bs\.run.*)", str(refused.value)).groups()
+    known = {"bs": bs, "plots": plots, "reference": truth, "radar": RADAR, "motion": MOTION}
+    found = eval(first, known)  # noqa: S307 - the package's own words, tried
+    estimate = eval(second, known | {"found": found})  # noqa: S307 - as above
+    assert frame in first
+    assert bs.rmse(estimate, truth) < 0.5 * bs.rmse(bs.run("ekf", MOTION, RADAR, plots), truth)
 
 
 def test_no_runs_are_no_plots():

@@ -154,6 +154,7 @@ class _Pass(NamedTuple):
 
 
 _PASSES = dict.fromkeys(("error-model", "ecmkf", "emekf"), _Pass(correct))
+_THEN = {"ecmkf": ('frame="cartesian"', "kf"), "emekf": ('frame="polar"', "mekf")}
 
 
 def names() -> tuple[str, ...]:
@@ -165,6 +166,13 @@ def lookup(name: str) -> Filter:
     """The filter of that name; UsageError with the nearest valid name if there is none."""
     if name in _FILTERS:
         return _FILTERS[name]
+    if name in _THEN:
+        frame, entry = _THEN[name]
+        raise UsageError(
+            f"{name} is two steps: an error model corrects plots, then a filter runs",
+            next_step=f'found = bs.error_model(plots, reference, radar, model="kashyap", {frame}); '
+            f'bs.run("{entry}", motion, found.sensor, found.plots)',
+        )
     raise unknown("filter", name, _FILTERS)
 
 

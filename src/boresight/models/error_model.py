@@ -57,8 +57,8 @@ class ErrorModel:
             reference (which so leaks into the plot), or nothing.
         outage: what corrects where the reference is missing: the error as it was last, as its
             model moves it, or nothing. Its variance grows in any case.
-        window: differences that the noise of plots is estimated from, 2 to 200; None: it is the
-            sensor's.
+        window: differences that the noise of plots is estimated from, 2 to 200; the reference's
+            own noise is in them. None: it is the sensor's.
         warm_up: differences before that estimate is used; None: a full window.
         floor: share of the sensor's own covariance in the estimate, which is never below it.
         noise: whether covariances between channels are dropped or kept.
