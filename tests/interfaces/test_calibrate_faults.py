@@ -292,3 +292,13 @@ def test_measured_elevation_gives_its_bias(demo):
     assert term.observable
     assert abs(term.estimate - 0.3) < 4.0 * 0.1 / np.sqrt(len(true))  # four sd: 1 in 16,000
     assert said.noise.elevation_deg == pytest.approx(0.1, rel=0.1)
+
+
+def test_the_page_of_one_target_draws_nothing_from_what_was_believed_before(demo):
+    one = demo.plots.filter(pl.col("address") == "F00028")
+    found = bs.calibrate(one, reference=demo.reports, site=PLACE)
+    page = bs.report(found).html
+    assert "times narrower" not in page
+    assert "within the 95 % interval" not in page
+    assert "Correlation of the estimates" not in page
+    assert "no interval: too few targets" in page

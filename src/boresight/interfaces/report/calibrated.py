@@ -11,6 +11,7 @@ from boresight.interfaces.report import (
     calibration_residuals,
     calibration_tables,
 )
+from boresight.interfaces.report.calibration_findings import shown_sd
 from boresight.interfaces.report.calibration_scale import Typical, typical
 from boresight.interfaces.report.calibration_verdict import sentences
 from boresight.interfaces.report.calibration_words import NAMES, unit
@@ -128,7 +129,7 @@ def _tile(calibration: "Calibration", name: str) -> Tile:
         return Tile(kind.words, "–", "not estimated")
     if not term.observable:
         return Tile(kind.words, "–", "not observable here")
-    places = decimals(term.sd)
+    places = decimals(shown_sd(term))
     said = interval(term.ci95, places, kind.unit)
     return Tile(kind.words, with_unit(term.estimate, places, kind.unit), said)
 

@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from boresight.interfaces.report import charts
-from boresight.interfaces.report.calibration_findings import Finding, findings, systematic
+from boresight.interfaces.report.calibration_findings import (
+    Finding,
+    findings,
+    has_interval,
+    shown_sd,
+    systematic,
+)
 from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.charts import Chart
 from boresight.interfaces.report.residuals import NORMAL_95, Panel
@@ -32,7 +38,9 @@ STRONG = 0.8  # of a correlation: white figures are read better on it
 def panels(calibration: "Calibration", typical: Typical) -> list[Panel]:
     """Draw the terms with their intervals and, of several, their correlations."""
     drawn = [_terms(calibration, typical)] if calibration.terms else []
-    return drawn + ([_correlation(calibration)] if len(calibration.errors.terms) > 1 else [])
+    known = any(has_interval(term) for term in calibration.terms.values())
+    several = known and len(calibration.errors.terms) > 1
+    return drawn + ([_correlation(calibration)] if several else [])
 
 
 def _terms(calibration: "Calibration", typical: Typical) -> Panel:
@@ -73,7 +81,7 @@ class _Row(NamedTuple):
 
 def _row(name: str, calibration: "Calibration", scale: float, place: float) -> _Row:
     term, kind = calibration.terms[name], TERMS[name]
-    places = decimals(term.sd)
+    places = decimals(shown_sd(term))
     estimate = with_unit(term.estimate, places, kind.unit)
     low, high = (end * scale for end in term.ci95)
     return _Row(

@@ -29,7 +29,7 @@ def _finding(name: str, term: "TermFound", calibration: "Calibration") -> Findin
     beyond = systematic(name, calibration)
     if not term.observable:
         return Finding.UNSEEN
-    if not (math.isfinite(low) and math.isfinite(high)):
+    if not has_interval(term):
         return Finding.ENDLESS
     if low > beyond or high < -beyond:
         return Finding.ERROR
@@ -46,3 +46,13 @@ def systematic(name: str, calibration: "Calibration") -> float:
     """
     known = calibration.settings.get("azimuth_systematic_deg", 0.0)
     return float(known or 0.0) if name == "azimuth_bias_deg" else 0.0
+
+
+def has_interval(term: "TermFound") -> bool:
+    """Whether the data told how sure a term is; else `sd` is what was believed before them."""
+    return all(map(math.isfinite, term.ci95))
+
+
+def shown_sd(term: "TermFound") -> float:
+    """The standard deviation that says how many digits of a term are worth showing."""
+    return term.sd if has_interval(term) else term.independent_sd

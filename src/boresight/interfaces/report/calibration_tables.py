@@ -2,7 +2,12 @@
 
 from typing import TYPE_CHECKING
 
-from boresight.interfaces.report.calibration_findings import Finding, findings
+from boresight.interfaces.report.calibration_findings import (
+    Finding,
+    findings,
+    has_interval,
+    shown_sd,
+)
 from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.calibration_words import meaning
 from boresight.interfaces.report.words import (
@@ -46,16 +51,19 @@ def terms(calibration: "Calibration", typical: Typical) -> str:
 
 
 def _term(name: str, term: "TermFound", metres: float, finding: Finding) -> list[Cell]:
-    kind, places = TERMS[name], decimals(term.sd)
+    kind, places = TERMS[name], decimals(shown_sd(term))
     if finding is Finding.UNSEEN:
         return [text_cell(kind.words), *[NOTHING] * 5, Cell(finding)]
     estimate, is_error = with_unit(term.estimate, places, kind.unit), finding is Finding.ERROR
     cells = [
         Cell(f"<b>{estimate}</b>" if is_error else estimate, is_figure=True),
         Cell(interval(term.ci95, places, kind.unit), is_figure=True),
-        Cell(_sd(term.sd), is_figure=True),
+        Cell(_sd(term.sd), is_figure=True) if has_interval(term) else NOTHING,
         Cell(_sd(term.independent_sd), is_figure=True),
-        Cell(with_unit(term.estimate * metres, decimals(term.sd * metres), "m"), is_figure=True),
+        Cell(
+            with_unit(term.estimate * metres, decimals(shown_sd(term) * metres), "m"),
+            is_figure=True,
+        ),
     ]
     said = f"<b>{finding}</b>" if is_error else str(finding)
     return [text_cell(kind.words), *cells, Cell(said)]

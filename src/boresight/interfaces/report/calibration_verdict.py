@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boresight.interfaces.report.calibration_findings import Finding, findings, systematic
+from boresight.interfaces.report.calibration_findings import (
+    Finding,
+    findings,
+    has_interval,
+    shown_sd,
+    systematic,
+)
 from boresight.interfaces.report.calibration_residuals import inliers, measured
 from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.calibration_words import MEANING, REFERENCES, unit
@@ -64,11 +70,11 @@ def _errors(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
 
 
 def _estimate(name: str, term: "TermFound") -> str:
-    return with_unit(term.estimate, decimals(term.sd), TERMS[name].unit)
+    return with_unit(term.estimate, decimals(shown_sd(term)), TERMS[name].unit)
 
 
 def _interval(name: str, term: "TermFound") -> str:
-    return interval(term.ci95, decimals(term.sd), TERMS[name].unit)
+    return interval(term.ci95, decimals(shown_sd(term)), TERMS[name].unit)
 
 
 def _eccentricity(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
@@ -195,14 +201,14 @@ def _air(calibration: "Calibration") -> Iterator[Sentence]:
     term, air = calibration.terms.get("range_gain_m_per_km"), calibration.air_gain_m_per_km
     if term is None or not math.isfinite(air):
         return
-    places = decimals(term.sd)
+    places = decimals(shown_sd(term))
     said = f"{with_unit(air, max(places, 2), 'm/km')}"
     if calibration.atmosphere != "none":
         text = (
             f"The delay of the air was taken out before ({escape(calibration.atmosphere)}). It "
             f"would have looked like a range gain of {said} over these pairs."
         )
-    elif not term.observable:
+    elif not (term.observable and has_interval(term)):
         text = f"The delay of a standard atmosphere alone looks like a range gain of {said} here."
     else:
         low, high = term.ci95
@@ -222,7 +228,8 @@ def _what_is_left(calibration: "Calibration") -> Iterator[Sentence]:
     kept = inliers(calibration.residuals)
     parts, worth = [], []
     for channel in measured(kept):
-        before, after = (_rms(column(kept, name)) for name in channel.columns)
+        squares = (np.square(column(kept, name)) for name in channel.columns)
+        before, after = (float(np.sqrt(np.nanmean(each))) for each in squares)
         sign = channel.unit if channel.unit == "°" else f" {channel.unit}"
         parts.append(f"{channel.words} {figure(before, 3)} to {figure(after, 3)}{sign}")
         worth.append(after / before if before else 1.0)
@@ -233,10 +240,6 @@ def _what_is_left(calibration: "Calibration") -> Iterator[Sentence]:
             f"The noise of one plot is {_noise(calibration)}.",
             "before-after",
         )
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.nanmean(np.square(values))))
 
 
 def _noise(calibration: "Calibration") -> str:
@@ -277,8 +280,10 @@ def _outliers(calibration: "Calibration") -> Iterator[Sentence]:
 
 
 def _sureness(calibration: "Calibration") -> Iterator[Sentence]:
-    terms = [each for each in calibration.terms.values() if each.observable]
-    ratios = [t.sd / t.independent_sd for t in terms if t.independent_sd > 0 and t.sd < math.inf]
+    terms = [each for each in calibration.terms.values() if each.observable and has_interval(each)]
+    if not terms:
+        return
+    ratios = [t.sd / t.independent_sd for t in terms if t.independent_sd > 0]
     text = (
         f"The intervals take the errors of one target as alike: {figure(calibration.pairs)} "
         f"{unit(calibration)} count as {figure(calibration.targets)} targets."
