@@ -302,3 +302,19 @@ def test_the_page_of_one_target_draws_nothing_from_what_was_believed_before(demo
     assert "within the 95 % interval" not in page
     assert "Correlation of the estimates" not in page
     assert "no interval: too few targets" in page
+
+
+def test_a_reference_in_anothers_names_is_read_by_a_map_of_its_columns(demo, tmp_path):
+    theirs = {"time_s": "t", "latitude_deg": "lat", "longitude_deg": "lon"}
+    demo.reports.rename(theirs).write_parquet(tmp_path / "gps.parquet")
+    ask = ("calibrate", demo.path, "--reference", tmp_path / "gps.parquet", "--json")
+    missing = boresight(*ask)
+    assert missing.code == 65
+    assert "has no column time_s" in missing.error
+    asked = ",".join(f"{ours}={their}" for ours, their in theirs.items())
+    named = boresight(*ask, "--reference-columns", asked)
+    assert named.code == 0, named.error
+    assert json.loads(named.out)["pairs"] == len(paired(demo.plots, demo.reports).pairs)
+    wrong = boresight(*ask, "--reference-columns", "t")
+    assert wrong.code == 2
+    assert "--reference-columns 't'" in wrong.error

@@ -42,6 +42,7 @@ def calibrate(
     gate_m: float | None,
     strict: bool,
     columns: Mapping[str, str] | None,
+    reference_columns: Mapping[str, str] | None,
     folder: Path | None,
 ) -> Answer:
     """Find what is wrong with a recording's radar; with a folder, write it down."""
@@ -62,6 +63,7 @@ def calibrate(
             terms=terms,
             atmosphere=atmosphere,
             gate_m=gate_m,
+            columns=reference_columns,
         )
     found = replace(found, remarks=[*damage(file, read.summary), *found.remarks])
     about = read.summary | {"file": file.name, "sha256": sha256(file)}

@@ -1,6 +1,6 @@
 """The verb `calibrate`: a recording and a reference, whatever these are, make one calibration."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -129,8 +129,12 @@ def calibrated(
     terms: tuple[str, ...] | None,
     atmosphere: Atmosphere | None,
     gate_m: float | None,
+    columns: Mapping[str, str] | None = None,
 ) -> "Calibration":
-    """The calibration of one radar of a recording; arguments as `calibrate` has read them."""
+    """The calibration of one radar of a recording; arguments as `calibrate` has read them.
+
+    `columns` are those of the reference, if it is the file of a table: our name to the file's.
+    """
     from boresight.calibration.calibrate import calibrate as by_reference
     from boresight.calibration.calibrate import calibrate_by_downlink
 
@@ -147,7 +151,7 @@ def calibrated(
         return calibrate_by_downlink(read.plots, site, sensor=sensor, atmosphere=atmosphere)
     return by_reference(
         read.plots,
-        _reference(read, reference),
+        _reference(read, reference, columns),
         site,
         sensor=sensor,
         terms=terms,
@@ -165,7 +169,9 @@ def _refuse(value: Any, what: str, why: str) -> None:
         )
 
 
-def _reference(read: "Recording", given: "str | Path | pl.DataFrame") -> "Reference":
+def _reference(
+    read: "Recording", given: "str | Path | pl.DataFrame", columns: Mapping[str, str] | None
+) -> "Reference":
     from boresight.calibration import references
 
     if not isinstance(given, str | Path):
@@ -173,7 +179,7 @@ def _reference(read: "Recording", given: "str | Path | pl.DataFrame") -> "Refere
     name = str(given)
     if name in IN_THE_RECORDING:
         return references.from_recording(read, IN_THE_RECORDING[name])
-    return references.from_file(name)
+    return references.from_file(name, columns=columns)
 
 
 def read_calibration(path: str | PathLike[str]) -> "Calibration":

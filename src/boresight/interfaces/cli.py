@@ -141,6 +141,9 @@ def calibrate(
     ] = None,
     strict: Strict = False,
     columns: Columns = None,
+    reference_columns: Annotated[
+        str | None, Parameter(help="The same for a table of reference (latitude_deg=lat,...).")
+    ] = None,
     output: Output | None = None,
 ) -> Job:
     """Find what is wrong with a radar, against GPS, ADS-B or downlink."""
@@ -155,6 +158,7 @@ def calibrate(
         gate_m=gate,
         strict=strict,
         columns=_columns(columns),
+        reference_columns=_columns(reference_columns, "--reference-columns"),
         folder=output,
     )
 
@@ -189,8 +193,8 @@ def cite(name: Annotated[str, Parameter(help="A filter's name, such as mekf.")],
     return partial(jobs.cite, name)
 
 
-def _columns(text: str | None) -> dict[str, str] | None:
-    return door.columns(text) if text is not None else None
+def _columns(text: str | None, option: str = "--columns") -> dict[str, str] | None:
+    return door.columns(text, option) if text is not None else None
 
 
 def run(arguments: Sequence[str]) -> int:

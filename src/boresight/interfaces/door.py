@@ -141,7 +141,7 @@ def filters(texts: Sequence[str]) -> "tuple[list[Filter], bool]":
     return chosen, ALL in said
 
 
-def columns(text: str) -> dict[str, str]:
+def columns(text: str, option: str = "--columns") -> dict[str, str]:
     """Read `OURS=THEIRS,...`: which column of a table holds what.
 
     Raises:
@@ -150,8 +150,10 @@ def columns(text: str) -> dict[str, str]:
     pairs = [part.partition("=") for part in text.split(",")]
     if not all(ours.strip() and theirs.strip() for ours, _, theirs in pairs):
         raise UsageError(
-            f"--columns {text!r} is not OURS=THEIRS, parted by commas",
-            next_step="for example: --columns range_m=rng,azimuth_deg=az,time_s=t",
+            f"{option} {text!r} is not OURS=THEIRS, parted by commas",
+            next_step=f"for example: {option} time_s=t,range_m=rng,azimuth_deg=az"
+            if option == "--columns"
+            else f"for example: {option} time_s=t,latitude_deg=lat,longitude_deg=lon",
         )
     return {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
 
