@@ -16,7 +16,11 @@ JUDGES = {
     "calibration/comparing": _PAIRED,
     "calibration/due": _PAIRED,
     "calibration/screening": ("calibration/test_references", "calibration/test_reference_rules"),
-    "calibration/faults": ("calibration/test_reference_faults", "calibration/test_pairing_rules"),
+    "calibration/faults": (
+        "calibration/test_reference_senses",
+        "calibration/test_reference_faults",
+        "calibration/test_pairing_rules",
+    ),
     "calibration/same_day": _PAIRED,
     "calibration/detection": ("calibration/test_detection",),
     "calibration/false_plots": ("calibration/test_detection",),
@@ -169,6 +173,8 @@ FAULTS = (
         ("ratio * FOOT_M - 1.0", "ratio - FOOT_M"),
         ('exchanged": (east, north)', 'exchanged": (north, east)'),
         ("(north, -east)", "(-north, -east)"),
+        ("_QUARTER + pl.col", "-_QUARTER + pl.col"),
+        ("_ZONE_S = 1_800.0", "_ZONE_S = 3_600.0"),
         ("axis=1) > _MOVING_MPS", "axis=1) < _MOVING_MPS"),
     ),
     *faults(

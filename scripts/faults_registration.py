@@ -13,7 +13,8 @@ JUDGES = {
     "calibration/clusters": _REGISTERED,
     "calibration/laws": ("calibration/test_outlier_classes", *_REGISTERED),
     "calibration/robust": ("calibration/test_outlier_classes", *_REGISTERED),
-    "calibration/fit": _REGISTERED,
+    "calibration/wander": ("calibration/test_registration_wander",),
+    "calibration/fit": ("calibration/test_registration_information", *_REGISTERED),
     "calibration/observability": (
         "calibration/test_observability_words",
         "calibration/test_observability",
@@ -162,6 +163,17 @@ FAULTS = (
         ("left[self.pairs.ranging] += ", "left[self.pairs.ranging] -= "),
         ("weight = self.worth * self.classes.weight", "weight = self.classes.weight**2"),
         ("if few is not pairs or any(term in MOVING for term in terms)", "if few is not pairs"),
+    ),
+    *faults(
+        "calibration/wander.py",
+        ("variance * (1.0 - alike**2)", "variance * (1.0 - alike)"),
+        ("alike[1:] ** 2 * fresh[1:]", "alike[1:] * fresh[1:]"),
+        ("1.0 / (diagonal + back - precise)", "1.0 / (diagonal + back)"),
+        ("weighted - self.weight * self.smooth", "weighted + self.weight * self.smooth"),
+        ("square -= float((pull**2 / power).sum())", "pass"),
+        ("logs += np.log(power).sum()", "logs -= np.log(power).sum()"),
+        ("-float(np.log(fresh).sum())", "float(np.log(fresh).sum())"),
+        ("variance * residuals.loss(variance, time_s)[1]", "variance"),
     ),
     *faults(
         "calibration/observability.py",
