@@ -113,6 +113,7 @@ def test_errors_that_wander_are_told_and_are_no_outliers():
     assert found.noise.range_m == pytest.approx(np.hypot(15.0, about_level), rel=0.15)
     assert found.noise.residual_range_m == pytest.approx(np.hypot(15.0, np.hypot(60, 30)), rel=0.2)
     assert found.noise.residual_azimuth_deg == pytest.approx(NOISE.azimuth_deg, rel=0.05)
+    assert found.noise.laws["range_m"].sd == pytest.approx(np.hypot(15.0, SLOW_M), rel=0.3)
     (remark,) = [remark for remark in found.remarks if "wander" in remark]
     assert remark.startswith("Errors of range")
 
@@ -123,6 +124,8 @@ def test_a_fit_that_knows_of_wandering_knows_the_time_better(monkeypatch):
     monkeypatch.setattr(fit, "_ROUNDS", 0)
     unknowing = register(pairs, SIX).terms["time_bias_s"]
     assert knowing.sd < 0.6 * unknowing.sd
+    # every pair by itself errs as much as before
+    assert knowing.independent_sd == pytest.approx(unknowing.independent_sd, rel=0.3)
     assert abs(knowing.estimate - TRUE["time_bias_s"]) < 3.5 * knowing.sd
 
 
