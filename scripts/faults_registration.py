@@ -13,7 +13,10 @@ JUDGES = {
     "calibration/clusters": _REGISTERED,
     "calibration/laws": ("calibration/test_outlier_classes", *_REGISTERED),
     "calibration/robust": ("calibration/test_outlier_classes", *_REGISTERED),
-    "calibration/wander": ("calibration/test_registration_wander",),
+    "calibration/wander": (
+        "calibration/test_registration_information",
+        "calibration/test_registration_wander",
+    ),
     "calibration/fit": ("calibration/test_registration_information", *_REGISTERED),
     "calibration/observability": (
         "calibration/test_observability_words",

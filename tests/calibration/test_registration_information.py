@@ -5,6 +5,7 @@ import pytest
 from radar_worlds import Noise, world
 
 from boresight.calibration.fit import fit
+from boresight.calibration.wander import Residuals, wandering
 from boresight.models.systematic import TERMS, design
 
 THREE = ("range_bias_m", "range_gain_m_per_km", "azimuth_bias_deg")
@@ -32,3 +33,19 @@ def test_the_information_of_a_target_is_that_of_its_pairs_and_their_common_delay
         assert abs(off[2, 2]) < 1e-9
     prior = np.diag([TERMS[term].scale ** -2.0 for term in THREE])
     np.testing.assert_allclose(np.diag(found.prior), prior)
+
+
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_what_wanders_is_found_in_metres_whatever_the_weights_are_counted_in(factor):
+    rng, targets, each, alike = np.random.default_rng(3), 20, 60, 0.9
+    fresh = rng.normal(size=(targets, each)) * np.r_[1.0, np.full(each - 1, np.sqrt(1 - alike**2))]
+    slow = np.zeros((targets, each))
+    for i in range(each):
+        slow[:, i] = (alike * slow[:, i - 1] if i else 0.0) + fresh[:, i]
+    left = (60.0 * slow + 15.0 * rng.normal(size=slow.shape)).ravel()
+    gaps = np.tile(np.r_[np.inf, np.full(each - 1, 8.0)], targets)
+    said, other = (
+        wandering(Residuals(left, np.full(left.size, weight / 15.0**2), gaps, levels=True))
+        for weight in (1.0, factor)
+    )
+    assert other == pytest.approx(said, rel=0.02)
