@@ -3,6 +3,7 @@
 import io
 import json
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from importlib.resources import as_file, files
 from types import SimpleNamespace
 
@@ -318,3 +319,14 @@ def test_a_reference_in_anothers_names_is_read_by_a_map_of_its_columns(demo, tmp
     wrong = boresight(*ask, "--reference-columns", "t")
     assert wrong.code == 2
     assert "--reference-columns 't'" in wrong.error
+
+
+def test_noise_against_downlink_is_not_that_of_plots_and_is_not_tracked_with(demo, folder):
+    found = bs.read_calibration(folder / "calibration.toml")
+    by_downlink = replace(found, reference="downlink")
+    some = demo.plots.filter(pl.col("address").is_in(demo.reports["address"].unique().implode()))
+    plain = bs.track(some, calibration=found, site=PLACE)
+    other = bs.track(some, calibration=by_downlink, site=PLACE)
+    assert plain.settings["noise"]["range_m"] == found.noise.range_m
+    assert other.settings["noise"]["range_m"] != found.noise.range_m
+    assert any("only what changes from plot to plot" in remark for remark in other.remarks)

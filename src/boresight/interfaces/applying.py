@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from boresight.maths.frames import Site
     from boresight.models.atmosphere import Atmosphere
 
+DOWNLINK = "downlink"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Applied:
@@ -60,13 +62,19 @@ def applied(
             f"{chosen or ', '.join(map(str, known))}."
         )
     noise = (found.noise.range_m, found.noise.azimuth_deg)
+    is_whole = all(map(isfinite, noise)) and found.reference != DOWNLINK
+    if found.reference == DOWNLINK:
+        remarks.append(
+            "The noise was found from the plots, not taken from the calibration: against downlink "
+            "it shows only what changes from plot to plot."
+        )
     delay = found.noise.target_range_m
     arguments = {
         "site": site or found.site,
         "sensor": chosen,
         "atmosphere": _air(found, atmosphere),
         "errors": found.errors,
-        "sensor_noise": noise if all(map(isfinite, noise)) else None,
+        "sensor_noise": noise if is_whole else None,
         "delay_m": delay if isfinite(delay) else 0.0,
     }
     return Applied(arguments=arguments, remarks=remarks)
