@@ -1,5 +1,6 @@
 """A calibration of the first half, taken out of the second: nothing is left that shows itself."""
 
+from dataclasses import replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from boresight.calibration import references
 from boresight.calibration.calibrate import calibrate
 from boresight.calibration.correcting import correct
 from boresight.formats.recording import read_recording
+from boresight.maths import frames
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import ExponentialAtmosphere
 
@@ -87,3 +89,19 @@ def test_other_sensors_stay_as_they_are(demo):
     both = correct(pl.concat([plots, other]), found)
     assert both.tail(other.height).equals(other)
     assert not both.head(plots.height).equals(plots)
+
+
+def test_a_site_kilometres_off_is_doubted_and_found_when_it_is_asked_for(demo):
+    """Whole targets then are outliers, which must not make weights of nothing."""
+    plots, reference, site, air = demo
+    wrong = replace(site, latitude_deg=site.latitude_deg + 0.0275)
+    found = calibrate(plots, reference, wrong, atmosphere=air)
+    assert any("a wrong site" in remark for remark in found.remarks)
+    terms = ("range_bias_m", "azimuth_bias_deg", "time_bias_s", "site_east_m", "site_north_m")
+    moved = calibrate(plots, reference, wrong, atmosphere=air, terms=terms)
+    east, north, _ = frames.enu_from_geodetic(
+        site.latitude_deg, site.longitude_deg, site.height_m, wrong
+    )
+    assert moved.terms["site_north_m"].estimate == pytest.approx(north, abs=30)
+    assert moved.terms["site_east_m"].estimate == pytest.approx(east, abs=30)
+    assert not any("a wrong site" in remark for remark in moved.remarks)

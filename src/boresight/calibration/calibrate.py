@@ -13,7 +13,7 @@ from boresight.calibration.pairs import Pairs
 from boresight.calibration.references import Reference
 from boresight.calibration.registration import register
 from boresight.calibration.residuals import noise_tables, residual_table
-from boresight.calibration.result import Calibration
+from boresight.calibration.result import Calibration, NoiseFound
 from boresight.calibration.stability import stability
 from boresight.errors import DataError
 from boresight.formats.usable import one_sensor
@@ -33,6 +33,8 @@ USUAL = (
     "time_bias_s",
 )
 _FEWEST = 3  # pairs
+_DELAY_M = 225.0  # three times what half a microsecond, a transponder's tolerance, makes of range
+_WRONG = 0.24  # the share of outliers is held below a quarter for wrong places
 NOT_TRUTH = (
     "The reference is a centre's system tracks, made from radars (perhaps this one among them), "
     "not truth: what all of them share does not show here, and their smoothing does."
@@ -75,7 +77,7 @@ def calibrate(
     found = register(pairing.pairs, wanted)
     left = stability(pairing.pairs, found)
     tables = detection_tables(pairing, mine, site)
-    remarks += [*reference.remarks, *pairing.remarks, *found.remarks]
+    remarks += [*reference.remarks, *pairing.remarks, *found.remarks, *_doubts(found.noise)]
     remarks += [NO_GATE] * (gate_m is not None and pairing.how == "identity")
     remarks += [NOT_TRUTH] * (reference.kind == "system tracks")
     return Calibration(
@@ -134,6 +136,24 @@ def _check_number(pairs: Pairs, terms: tuple[str, ...], dropped: dict[str, int])
             why=reasons or "no plot was dropped, so the recording has no more",
             next_step="record for longer, or name fewer terms",
         )
+
+
+def _doubts(noise: NoiseFound) -> list[str]:
+    """What does not look like a radar whose terms were all asked for."""
+    found = []
+    if noise.target_range_m > _DELAY_M:
+        found.append(
+            f"Ranges differ by {noise.target_range_m:,.0f} m from target to target, where "
+            f"transponders make {_DELAY_M / 3:.0f} m at most: a wrong site (try site among the "
+            "terms) or a wrong reference would do that."
+        )
+    if noise.outlier_share > _WRONG:
+        found.append(
+            f"{100 * noise.outlier_share:.0f} % of the pairs look like no measurement of their "
+            "target, as much as this fit can bear: do not trust its figures before that is "
+            "explained."
+        )
+    return found
 
 
 def _name(plots: "pl.DataFrame") -> str:

@@ -73,8 +73,9 @@ class Columns(NamedTuple):
         for channel, own in enumerate(inverses):
             if own.slow is not None:
                 power = self.by_target(own(np.ones(len(self.order))))
-                share = power / np.maximum(self.by_target(own.weight), np.finfo(float).tiny)
-                worth[channel] = np.repeat(share, self.counts)
+                whole = np.maximum(self.by_target(own.weight), np.finfo(float).tiny)
+                # a target of outliers alone has no weight but rounding: its share is void
+                worth[channel] = np.repeat(np.clip(power / whole, 0.0, 1.0), self.counts)
         return worth
 
     def sums(self, weight: Array, prior: Array) -> Sums:

@@ -1,16 +1,17 @@
 """The fit of a registration: from a robust start to the most likely terms, delays and laws."""
 
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from boresight.calibration.clusters import Solved, delay_variance, solve
 from boresight.calibration.columns import MOVING, Columns, columns, thinned
 from boresight.calibration.fixed_point import fixed_point
-from boresight.calibration.laws import Classes, Errors, Laws, first_laws
+from boresight.calibration.laws import Classes, Errors, first_laws
 from boresight.calibration.pairs import Pairs
 from boresight.calibration.robust import classify, late_is_apart, refit
+from boresight.calibration.state import Packing, Slow, State
 from boresight.calibration.wander import MOST, Inverse, Residuals, Wander, wandering
 from boresight.models.systematic import TERMS
 
@@ -25,42 +26,6 @@ _OUTLIER = 0.5  # probability from which a pair counts as none
 _ROUNDS = 3  # of laws of wandering and all else in turn
 _WANDER_PAIRS = 50_000  # about as many tell how errors wander
 _NEARLY = 1e-3  # of the spread: residuals of the start below it weigh alike
-
-
-class Slow(NamedTuple):
-    """What is known of errors that wander along their target.
-
-    Attributes:
-        mean: (k, m) expected.
-        error: (k, m) variance around it, the delay being known.
-        left: (m,) of an error of the delay that the wandering does not take up.
-    """
-
-    mean: Array
-    error: Array
-    left: Array
-
-
-class State(NamedTuple):
-    """Where the search is.
-
-    Attributes:
-        terms: (n,).
-        delay: (targets,) predicted, m.
-        delay_error: (targets,) variance of their errors.
-        delay_var: variance of the delays.
-        laws: of noise and outliers.
-        wander: how errors wander along a target.
-        slow: where they did; None if they do not.
-    """
-
-    terms: Array
-    delay: Array
-    delay_error: Array
-    delay_var: float
-    laws: Laws
-    wander: Wander
-    slow: Slow | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -287,57 +252,3 @@ def spread(left: Array, seen: Array) -> Array:
     """(k,) robust standard deviation of residuals (k, m) where seen; 1 where nothing was."""
     rows = [np.abs(row[mask > 0.0]) for row, mask in zip(left, seen, strict=True)]
     return np.array([max(_MAD * np.median(row), 1e-9) if row.size else 1.0 for row in rows])
-
-
-class Packing(NamedTuple):
-    """A state as one vector whose parts compare: in standard deviations and logarithms.
-
-    Attributes:
-        terms: (n,) their standard deviations, about.
-        delay: scale of delays, m.
-        model: a state whose shapes, and whose numbers that are not sought, all others have.
-    """
-
-    terms: Array
-    delay: float
-    model: State
-
-    def pack(self, state: State) -> Array:
-        """As a vector."""
-        laws = state.laws
-        return np.concatenate(
-            [
-                state.terms / self.terms,
-                state.delay / self.delay,
-                state.delay_error / self.delay**2,
-                np.log(laws.sd),
-                laws.tail_share,
-                np.log(laws.tail_sd),
-                laws.wrong,
-                [np.log(laws.place_m), laws.late_s, laws.late_sd_s],
-                [state.delay_var / self.delay**2],
-            ]
-        )
-
-    def unpack(self, vector: Array) -> State:
-        """From a vector, brought back into bounds."""
-        model, targets = self.model.laws, len(self.model.delay)
-        sizes = (len(self.terms), targets, targets, *(len(model.sd),) * 3)
-        terms, delay, error, sd, share, wide, rest = np.split(vector, np.cumsum(sizes))
-        laws = replace(
-            model,
-            sd=np.exp(sd),
-            tail_share=share,
-            tail_sd=np.exp(wide),
-            wrong=rest[:2],
-            place_m=float(np.exp(rest[2])),
-            late_s=float(rest[3]),
-            late_sd_s=float(rest[4]) if model.late_sd_s else 0.0,
-        ).bounded()
-        return self.model._replace(
-            terms=terms * self.terms,
-            delay=delay * self.delay,
-            delay_error=np.maximum(error, 0.0) * self.delay**2,
-            delay_var=float(max(rest[5], 0.0)) * self.delay**2,
-            laws=laws,
-        )

@@ -56,7 +56,7 @@ def _classify(errors: Errors, laws: Laws) -> Classes:
     density[:2] += np.log(np.maximum(laws.wrong, SHARES[0]))[:, None]
     chance = np.exp(density - density.max(0))
     wrong, tail = chance[:2] / chance.sum(0), odds / (1.0 + odds)
-    belongs = (1.0 - wrong.sum(0)) * at.seen
+    belongs = np.maximum(1.0 - wrong.sum(0), 0.0) * at.seen
     mean = belongs * ((1.0 - tail) * narrow + tail * wide)
     mean_square = belongs * ((1.0 - tail) * narrow**2 + tail * wide**2)
     curvature = mean - square * (mean_square - mean**2)

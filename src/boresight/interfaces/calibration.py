@@ -58,25 +58,13 @@ def calibrate(
         UsageError: no site is known, or "adsb" of a frame that is not as `read` gave it.
         DataError: the reference has nothing in common with the plots, or a column is missing.
     """
-    import polars as pl
-
     read = reading.recording(plots)
     _check_frame(read.plots)
-    if isinstance(reference, str) and reference in IN_THE_RECORDING and not read.summary:
-        raise UsageError(
-            f"a frame of plots holds no reference {reference!r}",
-            why="only the frame that read gave, as it gave it, knows the recording it came from",
-            next_step="give the recording's path instead of the frame, or the reference's own",
-        )
+    _check_reference(reference, known=bool(read.summary))
     if sensor is not None and "sensor" in read.plots.columns:
         sensor = door.sensor(sensor, read.plots["sensor"].drop_nulls().unique().sort().to_list())
     if gate_m is not None:
         as_number("gate_m", gate_m)
-    if not isinstance(reference, str | PathLike | pl.DataFrame):
-        raise UsageError(
-            f"the reference is a {type(reference).__name__}",
-            next_step='give "adsb", "system-tracks" or "downlink", a file, or a Polars frame',
-        )
     return calibrated(
         read,
         Path(reference) if isinstance(reference, PathLike) else reference,
@@ -90,6 +78,23 @@ def calibrate(
 
 def _terms(given: Sequence[str] | str) -> tuple[str, ...]:
     return door.terms(given if isinstance(given, str) else ",".join(given))
+
+
+def _check_reference(reference: Any, *, known: bool) -> None:
+    """UsageError where a reference is of no kind, or asked of a recording that is not known."""
+    import polars as pl
+
+    if not isinstance(reference, str | PathLike | pl.DataFrame):
+        raise UsageError(
+            f"the reference is a {type(reference).__name__}",
+            next_step='give "adsb", "system-tracks" or "downlink", a file, or a Polars frame',
+        )
+    if isinstance(reference, str) and reference in IN_THE_RECORDING and not known:
+        raise UsageError(
+            f"a frame of plots holds no reference {reference!r}",
+            why="only the frame that read gave, as it gave it, knows the recording it came from",
+            next_step="give the recording's path instead of the frame, or the reference's own",
+        )
 
 
 def _check_frame(plots: "pl.DataFrame") -> None:
