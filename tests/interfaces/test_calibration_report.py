@@ -25,7 +25,8 @@ from boresight.interfaces.report import (
 from boresight.interfaces.report.calibration_findings import Finding, findings
 from boresight.interfaces.report.calibration_scale import Typical, typical
 from boresight.interfaces.report.calibration_verdict import sentences
-from boresight.interfaces.report.words import decimals, interval, with_unit
+from boresight.interfaces.report.words import interval
+from boresight.maths.digits import decimals, with_unit
 from boresight.models.systematic import SystematicErrors
 
 MEGABYTE = 1_000_000

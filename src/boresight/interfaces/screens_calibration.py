@@ -1,12 +1,13 @@
 """What a person sees of a calibration in the terminal."""
 
 from collections.abc import Mapping, Sequence
-from math import floor, isfinite, isnan, log10
+from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any
 
 from boresight.interfaces.report.calibration_words import NAMES, meaning, unit
 from boresight.interfaces.report.words import figure
 from boresight.interfaces.screens import table, text, written
+from boresight.maths.digits import decimals, with_unit
 from boresight.models.systematic import TERMS
 
 if TYPE_CHECKING:
@@ -63,17 +64,12 @@ def _figures(name: str, term: "TermFound") -> "tuple[RenderableType, ...]":
         return text("not observable", "yellow"), text("–"), text("–")
     if not (isfinite(low) and isfinite(high)):  # too few targets: `sd` is what was believed before
         digits = decimals(term.independent_sd)
-        return text(f"{term.estimate:+.{digits}f} {of}"), text("–"), text("too few targets")
+        return text(with_unit(term.estimate, digits, of)), text("–"), text("too few targets")
     digits = decimals(term.sd)
     proven = low > 0 or high < 0
-    estimate = text(f"{term.estimate:+.{digits}f} {of}", "bold" if proven else "")
-    interval = text(f"{low:+.{digits}f} to {high:+.{digits}f}")
-    return estimate, text(f"{term.sd:.{digits}f}"), interval
-
-
-def decimals(sd: float) -> int:
-    """Digits after the point that show two figures of a standard deviation."""
-    return max(0, 1 - floor(log10(sd))) if isfinite(sd) and sd > 0 else 3
+    estimate = text(with_unit(term.estimate, digits, of), "bold" if proven else "")
+    interval = text(f"{low:+z,.{digits}f} to {high:+z,.{digits}f}")
+    return estimate, text(f"{term.sd:,.{digits}f}"), interval
 
 
 def _noise(found: "Calibration") -> "RenderableType":

@@ -8,6 +8,7 @@ import numpy as np
 from boresight.errors import FormulaError, UsageError
 from boresight.filters.consider import consider
 from boresight.filters.recursion import Recursion
+from boresight.maths.digits import decimals, with_unit
 from boresight.maths.frames import Site, geodetic_from_enu
 from boresight.models.systematic import TERMS, SystematicErrors
 from boresight.tracking.flight import Filtered, Flights, fly
@@ -104,11 +105,17 @@ def applied(errors: SystematicErrors, left: SystematicErrors) -> dict[str, Any]:
     }
 
 
+def _figure(value: float, sd: float, unit: str) -> str:
+    """A number and its standard deviation: `+86.8 ± 1.9 m`."""
+    places = decimals(sd)
+    return f"{value:+z,.{places}f} ± " + with_unit(sd, places, unit).lstrip("+")
+
+
 def said(errors: SystematicErrors, left: SystematicErrors) -> str:
     """A sentence for the reader."""
     sd = np.sqrt(np.diag(errors.cov))
     figures = ", ".join(
-        f"{TERMS[t].words} {value:.3g} ± {spread:.2g} {TERMS[t].unit}"
+        f"{TERMS[t].words} {_figure(value, spread, TERMS[t].unit)}"
         for t, value, spread in zip(errors.terms, errors.estimate, sd, strict=True)
     )
     tail = (

@@ -17,7 +17,8 @@ from boresight.interfaces.report.calibration_verdict import sentences
 from boresight.interfaces.report.calibration_words import NAMES, unit
 from boresight.interfaces.report.residuals import Panel
 from boresight.interfaces.report.sections import Block, Part, Tile, small
-from boresight.interfaces.report.words import decimals, figure, interval, panel, with_unit
+from boresight.interfaces.report.words import figure, interval, panel
+from boresight.maths.digits import decimals, with_unit
 from boresight.models.systematic import TERMS
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from boresight.interfaces.report.calibration_findings import (
 from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.charts import Chart
 from boresight.interfaces.report.residuals import NORMAL_95, Panel
-from boresight.interfaces.report.words import decimals, interval, with_unit
+from boresight.interfaces.report.words import interval
+from boresight.maths.digits import decimals, with_unit
 from boresight.models.systematic import TERMS
 
 if TYPE_CHECKING:

@@ -13,15 +13,14 @@ from boresight.interfaces.report.calibration_words import meaning
 from boresight.interfaces.report.words import (
     Cell,
     clock,
-    decimals,
     figure,
     interval,
     number_cell,
     percent,
     table,
     text_cell,
-    with_unit,
 )
+from boresight.maths.digits import decimals, with_unit
 from boresight.models.systematic import TERMS
 
 if TYPE_CHECKING:

@@ -19,7 +19,8 @@ from boresight.interfaces.report.calibration_scale import Typical
 from boresight.interfaces.report.calibration_words import MEANING, REFERENCES, unit
 from boresight.interfaces.report.residuals import column
 from boresight.interfaces.report.verdict import Sentence, damage
-from boresight.interfaces.report.words import decimals, figure, interval, with_unit
+from boresight.interfaces.report.words import figure, interval
+from boresight.maths.digits import decimals, with_unit
 from boresight.models.systematic import TERMS
 
 if TYPE_CHECKING:

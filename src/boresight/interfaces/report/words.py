@@ -6,6 +6,8 @@ from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from boresight.maths.digits import with_unit
+
 if TYPE_CHECKING:
     from boresight.tracking.result import Gain
 
@@ -133,17 +135,6 @@ def panel(name: str, caption: str, *, alt: str, height_px: int | None = None) ->
         f'<figure><div class="chart" id="{name}"{style} role="img" aria-label="{escape(alt)}">'
         f"</div><figcaption>{caption}</figcaption></figure>"
     )
-
-
-def decimals(sd: float) -> int:
-    """Digits after the point that are worth showing: two of an sd up to 35, else one."""
-    known = math.isfinite(sd) and sd > 0
-    return min(max(math.ceil(-math.log10(sd / 3.5)), 0), 6) if known else 3
-
-
-def with_unit(value: float, places: int, unit: str) -> str:
-    """Render a signed number to so many places, its unit after it: `+0.535°`, `-2.7 m`."""
-    return f"{value:+z,.{places}f}" + (unit if unit == "°" else f" {unit}")
 
 
 def interval(ends: tuple[float, float], places: int, unit: str) -> str:
