@@ -60,6 +60,32 @@ class Claim:
         return row | ({"parts": [part.as_dict() for part in self.parts]} if self.parts else {})
 
 
+def part(
+    whole: str,
+    name: str,
+    published: Any,
+    ours: Any,
+    verdict: Verdict,
+    why: str = "",
+    band: Any = None,
+) -> Claim:
+    """One number, one sentence or one misprint of a claim."""
+    return Claim(
+        id=f"{whole} {name}",
+        where="",
+        published=published,
+        ours=ours,
+        band=band,
+        verdict=verdict,
+        assumption=why,
+    )
+
+
+def said(true: Any) -> Verdict:
+    """Verdict on a sentence that holds or does not."""
+    return "reproduces" if true else "does not reproduce"
+
+
 _FIELDS = ("id", "where", "published", "ours", "band", "verdict", "assumption")
 
 

@@ -18,14 +18,6 @@ if TYPE_CHECKING:
     from boresight.models.atmosphere import Atmosphere
 
 REPORT, TOML, RESIDUALS = "report.html", "calibration.toml", "residuals.parquet"
-ASKED = (  # what --json always has, estimated or not
-    "range_bias_m",
-    "range_gain_m_per_km",
-    "azimuth_bias_deg",
-    "azimuth_cos_deg",
-    "azimuth_sin_deg",
-    "time_bias_s",
-)
 REQUIRED = ("pairs", "targets", "terms", "noise", "air_gain_m_per_km")  # of the demo's answer too
 NOT_ESTIMATED = {"estimate": None, "sd": None, "ci95": None, "observable": False}
 
@@ -96,8 +88,10 @@ def keep(found: "Calibration", folder: Path) -> list[str]:
 
 
 def content(found: "Calibration", outputs: list[str]) -> dict[str, Any]:
-    """The object that `boresight calibrate --json` prints."""
-    terms = {name: dict(NOT_ESTIMATED) for name in ASKED}
+    """The object that `boresight calibrate --json` prints; usual terms are there, asked or not."""
+    from boresight.calibration.calibrate import USUAL
+
+    terms = {name: dict(NOT_ESTIMATED) for name in USUAL}
     terms |= {name: asdict(term) for name, term in found.terms.items()}
     return {
         "pairs": found.pairs,

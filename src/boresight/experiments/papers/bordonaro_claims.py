@@ -16,10 +16,8 @@ from boresight.experiments.papers.bordonaro_words import (
     agree,
     at_scans,
     nearer,
-    part,
     reasons,
     row,
-    said,
     somewhere,
 )
 from boresight.experiments.verdicts import (
@@ -27,6 +25,8 @@ from boresight.experiments.verdicts import (
     less,
     of_differences,
     of_points,
+    part,
+    said,
     together,
 )
 

@@ -15,7 +15,7 @@ from boresight.experiments.metrics import chi_square_bounds
 from boresight.experiments.papers.bordonaro_doppler import STANDARD
 from boresight.experiments.papers.bordonaro_study import Study
 from boresight.experiments.papers.bordonaro_tracks import COMPARED, OTHERS, Tracked
-from boresight.experiments.papers.figures import ratio_axis, save, sheet, writing_into
+from boresight.experiments.papers.figures import draw, ratio_axis, sheet
 
 Array = Any
 _INK = {"UCM": "tab:blue", "MUCM": "tab:orange", "DUCM": "tab:red", STANDARD: "tab:blue"}
@@ -24,24 +24,8 @@ _ZOOMS = (None, (1, 5), (5, 10), (10, 100))  # scans
 
 
 def write(study: Study, folder: Path) -> list[str]:
-    """Write BO-F2.png to BO-F14.png, and a CSV file beside each.
-
-    Args:
-        study: what is drawn.
-        folder: made if it is not there.
-
-    Returns:
-        The files' names.
-
-    Raises:
-        OutputError: the folder cannot be written.
-    """
-    files = []
-    with writing_into(folder):
-        for number, draw in _DRAWN.items():
-            figure, columns = draw(study)
-            files += save(figure, folder / f"BO-F{number}", columns)
-    return files
+    """Write BO-F2.png to BO-F14.png, and a CSV file beside each; see `figures.draw`."""
+    return draw(folder, "BO", _DRAWN, study)
 
 
 def _lines(place: Any, x: Array, lines: Mapping[str, Array], **axes: Any) -> None:

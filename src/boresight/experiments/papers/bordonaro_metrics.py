@@ -10,10 +10,16 @@ from boresight.experiments.metrics import anees_per_scan, chi_square_bounds
 from boresight.experiments.papers import bordonaro_doppler as doppler
 from boresight.experiments.papers.bordonaro_study import Study
 from boresight.experiments.papers.bordonaro_tracks import filtered
-from boresight.experiments.papers.bordonaro_words import agree, at_scans, part, reasons, row, said
+from boresight.experiments.papers.bordonaro_words import agree, at_scans, reasons, row
 from boresight.experiments.scenario import FOOT_M
 from boresight.experiments.simulate import simulate
-from boresight.experiments.verdicts import Claim, share_interval, together
+from boresight.experiments.verdicts import (
+    Claim,
+    part,
+    said,
+    share_interval,
+    together,
+)
 from boresight.filters import kalman
 from boresight.filters.steps import Updating
 from boresight.maths.seeds import Stream, normals

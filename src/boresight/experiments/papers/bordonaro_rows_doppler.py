@@ -5,8 +5,15 @@ import numpy as np
 from boresight.experiments.consistency import bias
 from boresight.experiments.papers.bordonaro_doppler import STANDARD, RangeRates
 from boresight.experiments.papers.bordonaro_study import Study
-from boresight.experiments.papers.bordonaro_words import nearer, part, reasons, row, said
-from boresight.experiments.verdicts import Claim, Verdict, of_differences, together
+from boresight.experiments.papers.bordonaro_words import nearer, reasons, row
+from boresight.experiments.verdicts import (
+    Claim,
+    Verdict,
+    of_differences,
+    part,
+    said,
+    together,
+)
 
 
 def figure_13(study: Study) -> Claim:

@@ -5,13 +5,15 @@ import numpy as np
 from boresight.experiments.consistency import Bias, bias
 from boresight.experiments.papers.bordonaro_study import Study
 from boresight.experiments.papers.bordonaro_tracks import OTHERS
-from boresight.experiments.papers.bordonaro_words import agree, part, reasons, row, said
+from boresight.experiments.papers.bordonaro_words import agree, reasons, row
 from boresight.experiments.verdicts import (
     Claim,
     less,
     of_differences,
     of_points,
     of_share,
+    part,
+    said,
     together,
 )
 from boresight.models.motion import Static

@@ -11,10 +11,8 @@ from boresight.experiments.papers.bordonaro_words import (
     agree,
     at_scans,
     nearer,
-    part,
     reasons,
     row,
-    said,
     somewhere,
 )
 from boresight.experiments.verdicts import (
@@ -23,6 +21,8 @@ from boresight.experiments.verdicts import (
     less,
     of_differences,
     of_points,
+    part,
+    said,
     together,
 )
 

@@ -23,25 +23,6 @@ def row(study: Study, kind: str, name: str, **found: Any) -> Claim:
     return Claim(id=name, where=stated["where"], published=stated["published"], **found)
 
 
-def part(
-    whole: str, name: str, published: Any, ours: Any, verdict: Verdict, why: str = ""
-) -> Claim:
-    """One sentence, or one misprint, of a claim."""
-    return Claim(
-        id=f"{whole} {name}",
-        where="",
-        published=published,
-        ours=ours,
-        verdict=verdict,
-        assumption=why,
-    )
-
-
-def said(true: Any) -> Verdict:
-    """Verdict on a sentence that holds or does not."""
-    return "reproduces" if true else "does not reproduce"
-
-
 def somewhere(holds: Array, fails: Array) -> Verdict:
     """Verdict on a sentence about some points, from those where it holds and where it fails."""
     if np.any(holds):

@@ -1,6 +1,6 @@
 """Figures as files: a picture, and beside it a table of the numbers in it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from boresight.errors import MissingExtraError, OutputError
 
 Array = Any
+Drawing = Callable[[Any], tuple[Any, Mapping[str, Array]]]
 _DOTS_PER_INCH = 150
 
 
@@ -54,6 +55,30 @@ def ratio_axis(place: Any) -> None:
     place.minorticks_off()
     place.set_yticks([1, 2, 3, 5, 10, 20], labels=["1", "2", "3", "5", "10", "20"])
     place.autoscale()
+
+
+def draw(folder: Path, prefix: str, drawings: Mapping[int, Drawing], study: Any) -> list[str]:
+    """Write every figure as PREFIX-F<number>.png, and its numbers as CSV beside it.
+
+    Args:
+        folder: made if it is not there.
+        prefix: of the paper.
+        drawings: by number, what makes of the study a figure and its columns.
+        study: what is drawn.
+
+    Returns:
+        The files' names.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    files = []
+    with writing_into(folder):
+        for number, drawing in drawings.items():
+            figure, columns = drawing(study)
+            named = {name.replace(",", ""): values for name, values in columns.items()}  # in a CSV
+            files += save(figure, folder / f"{prefix}-F{number}", named)
+    return files
 
 
 def save(figure: Any, path: Path, columns: Mapping[str, Array]) -> list[str]:

@@ -13,14 +13,20 @@ from boresight.experiments.papers.kashyap_study import Study
 from boresight.experiments.papers.kashyap_words import (
     comparable,
     leak,
-    part,
     ratios,
     reasons,
     row,
-    said,
     share,
 )
-from boresight.experiments.verdicts import Claim, Verdict, band_of, of_share, together
+from boresight.experiments.verdicts import (
+    Claim,
+    Verdict,
+    band_of,
+    of_share,
+    part,
+    said,
+    together,
+)
 
 Array = Any
 _FEW = 200  # runs beside the main question

@@ -11,8 +11,14 @@ import numpy as np
 
 from boresight.experiments.papers.kashyap_runs import Tracked
 from boresight.experiments.papers.kashyap_study import Study
-from boresight.experiments.papers.kashyap_words import comparable, leak, part, reasons, row, share
-from boresight.experiments.verdicts import Claim, band_of, of_share, together
+from boresight.experiments.papers.kashyap_words import comparable, leak, reasons, row, share
+from boresight.experiments.verdicts import (
+    Claim,
+    band_of,
+    of_share,
+    part,
+    together,
+)
 
 Array = Any
 _BOUNDS = "bounds are 2 sqrt(H P H') of the filter itself (erratum K9)"

@@ -12,10 +12,13 @@ import numpy as np
 
 from boresight.experiments.papers.kashyap_methods import Method, Ready, cmkf_d, run_ready
 from boresight.experiments.papers.kashyap_study import Study
-from boresight.experiments.papers.kashyap_words import row, said
+from boresight.experiments.papers.kashyap_words import row
 from boresight.experiments.scenario import Scenario
 from boresight.experiments.simulate import Plots, Truth, simulate
-from boresight.experiments.verdicts import Claim
+from boresight.experiments.verdicts import (
+    Claim,
+    said,
+)
 from boresight.models.motion import ConstantVelocity
 
 Array = Any

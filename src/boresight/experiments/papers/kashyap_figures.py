@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from boresight.experiments.papers.figures import save, sheet, writing_into
+from boresight.experiments.papers.figures import draw, sheet
 from boresight.experiments.papers.kashyap_runs import Tracked
 from boresight.experiments.papers.kashyap_study import Study
 from boresight.experiments.papers.kashyap_tables import printed
@@ -34,26 +34,9 @@ _CHANNELS = (
 
 
 def write(study: Study, folder: Path) -> list[str]:
-    """Write KA-F3.png to KA-F8.png, and a CSV file beside each.
-
-    Args:
-        study: what is drawn.
-        folder: made if it is not there.
-
-    Returns:
-        The files' names.
-
-    Raises:
-        OutputError: the folder cannot be written.
-    """
-    drawn = {3: _set_1, 4: _set_2, 5: _set_3, 6: _noise, 7: _chart, 8: _blocks}
-    files = []
-    with writing_into(folder):
-        for number, draw in drawn.items():
-            figure, columns = draw(study)
-            named = {name.replace(",", ""): values for name, values in columns.items()}  # in a CSV
-            files += save(figure, folder / f"KA-F{number}", named)
-    return files
+    """Write KA-F3.png to KA-F8.png, and a CSV file beside each; see `figures.draw`."""
+    drawings = {3: _set_1, 4: _set_2, 5: _set_3, 6: _noise, 7: _chart, 8: _blocks}
+    return draw(folder, "KA", drawings, study)
 
 
 def _set_1(study: Study) -> tuple[Any, dict[str, Array]]:

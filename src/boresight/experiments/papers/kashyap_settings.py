@@ -9,9 +9,13 @@ from boresight.experiments.metrics import channels, percent_fit_error
 from boresight.experiments.papers.kashyap_methods import plain, polar
 from boresight.experiments.papers.kashyap_runs import chunks, measured
 from boresight.experiments.papers.kashyap_study import SETS, Study
-from boresight.experiments.papers.kashyap_words import reasons, row, said
+from boresight.experiments.papers.kashyap_words import reasons, row
 from boresight.experiments.simulate import Truth, simulate
-from boresight.experiments.verdicts import Claim, Verdict
+from boresight.experiments.verdicts import (
+    Claim,
+    Verdict,
+    said,
+)
 from boresight.filters.recursion import Estimate
 from boresight.maths import wrap
 

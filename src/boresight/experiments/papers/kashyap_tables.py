@@ -15,14 +15,18 @@ from boresight.experiments.papers.kashyap_words import (
     leak,
     numbers,
     of_table,
-    part,
     ratios,
     reasons,
     row,
-    said,
 )
 from boresight.experiments.simulate import simulate
-from boresight.experiments.verdicts import Claim, band_of, worst
+from boresight.experiments.verdicts import (
+    Claim,
+    band_of,
+    part,
+    said,
+    worst,
+)
 
 Array = Any
 COUNT = "printed EMEKF/ECMKF ratios in the bands of ours"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from boresight.experiments.papers.kashyap_study import Study
-from boresight.experiments.verdicts import Claim, Verdict, band_of, of_number, of_share
+from boresight.experiments.verdicts import Claim, Verdict, band_of, of_number, of_share, part
 
 Array = Any
 Runs = Mapping[str, Mapping[str, Array]]
@@ -34,26 +34,6 @@ def leak(study: Study) -> str:
         "which the reference of the same epoch tells it, so the gain is the reference leaking into "
         "the estimate (KA-E1)"
     )
-
-
-def part(
-    whole: str, name: str, published: Any, ours: Any, verdict: Verdict, why: str, band: Any = None
-) -> Claim:
-    """One number, or one sentence, of a claim."""
-    return Claim(
-        id=f"{whole} {name}",
-        where="",
-        published=published,
-        ours=ours,
-        band=band,
-        verdict=verdict,
-        assumption=why,
-    )
-
-
-def said(true: Any) -> Verdict:
-    """Verdict on a sentence that holds or does not."""
-    return "reproduces" if true else "does not reproduce"
 
 
 def reasons(study: Study, *names: str) -> str:
