@@ -105,3 +105,13 @@ def test_a_site_kilometres_off_is_doubted_and_found_when_it_is_asked_for(demo):
     assert moved.terms["site_north_m"].estimate == pytest.approx(north, abs=30)
     assert moved.terms["site_east_m"].estimate == pytest.approx(east, abs=30)
     assert not any("a wrong site" in remark for remark in moved.remarks)
+
+
+def test_what_shows_may_be_of_terms_that_were_left_out(demo):
+    """85 m of range that nobody estimates: all targets err, and traffic changes with time."""
+    plots, reference, site, air = demo
+    told = "may be of errors that were not estimated: range bias"
+    alone = calibrate(plots, reference, site, atmosphere=air, terms=("azimuth_bias_deg",))
+    assert any("beyond chance" in remark for remark in alone.remarks)
+    assert any(told in remark for remark in alone.remarks)
+    assert not any(told in r for r in calibrate(plots, reference, site, atmosphere=air).remarks)

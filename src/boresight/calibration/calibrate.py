@@ -14,11 +14,12 @@ from boresight.calibration.references import Reference
 from boresight.calibration.registration import register
 from boresight.calibration.residuals import noise_tables, residual_table
 from boresight.calibration.result import Calibration, NoiseFound
-from boresight.calibration.stability import stability
+from boresight.calibration.stability import Stability, stability
 from boresight.errors import DataError
 from boresight.formats.usable import one_sensor
 from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere, spelled
+from boresight.models.systematic import TERMS
 
 if TYPE_CHECKING:
     import polars as pl
@@ -96,7 +97,7 @@ def calibrate(
         residuals=residual_table(pairing.pairs, found),
         tables=noise_tables(pairing.pairs, found) | left.tables | tables,
         settings=_settings(wanted, reference, pairing, gate),
-        remarks=[*remarks, *left.remarks, *detection_remarks(tables)],
+        remarks=[*remarks, *left.remarks, *_left_out(wanted, left), *detection_remarks(tables)],
     )
 
 
@@ -136,6 +137,15 @@ def _check_number(pairs: Pairs, terms: tuple[str, ...], dropped: dict[str, int])
             why=reasons or "no plot was dropped, so the recording has no more",
             next_step="record for longer, or name fewer terms",
         )
+
+
+def _left_out(terms: tuple[str, ...], left: Stability) -> list[str]:
+    """Errors that are not estimated look like sectors that err, or like drift."""
+    missing = [TERMS[term].words for term in USUAL if term not in terms]
+    if not (missing and left.remarks):
+        return []
+    said = "What shows by sector or over time may be of errors that were not estimated"
+    return [f"{said}: {', '.join(missing)}."]
 
 
 def _doubts(noise: NoiseFound) -> list[str]:
