@@ -118,7 +118,7 @@ def test_what_was_applied_is_recorded_and_said(traffic, site):
     assert (noise["range_m"], noise["azimuth_deg"]) == (20.0, 0.05)
     assert noise["accel_mps2"] <= 0.1  # found: it is 1 where it was not
     assert "given by the calibration" in result.settings["noise_chosen"]
-    assert any("corrected by the calibration: range bias 120 ± 25 m" in r for r in result.remarks)
+    assert any("corrected by the calibration: range bias +120 ± 25 m" in r for r in result.remarks)
     assert any("err" in r and "alike" in r for r in result.remarks)
 
 
