@@ -10,5 +10,5 @@ def decimals(sd: float) -> int:
 
 
 def with_unit(value: float, places: int, unit: str) -> str:
-    """Render a signed number to so many places, its unit after it: `+0.535°`, `-2.7 m`."""
+    """Render a signed number to so many places, its unit after it: `+0.250°`, `-3.1 m`."""
     return f"{value:+z,.{places}f}" + (unit if unit == "°" else f" {unit}")

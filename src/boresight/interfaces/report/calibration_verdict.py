@@ -38,11 +38,9 @@ def sentences(
     parts = (
         _errors(calibration, typical),
         _eccentricity(calibration, typical),
-        _within(calibration),
+        _said(calibration, Finding.WITHIN),
         _none(calibration, typical),
-        _shared(calibration),
-        _endless(calibration),
-        _unseen(calibration),
+        *(_said(calibration, kind) for kind in (Finding.SHARED, Finding.ENDLESS, Finding.UNSEEN)),
         _directions(calibration),
         _systematic(calibration),
         _air(calibration),
@@ -99,17 +97,6 @@ def _eccentricity(calibration: "Calibration", typical: Typical) -> Iterator[Sent
     )
 
 
-def _within(calibration: "Calibration") -> Iterator[Sentence]:
-    terms = _of(calibration, Finding.WITHIN)
-    if terms:
-        yield Sentence(
-            "note",
-            f"{_listed(terms).capitalize()}: not zero, but no more than the systematic part beside "
-            "the interval, so it is not shown to be the radar's.",
-            "bias",
-        )
-
-
 def _none(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
     """Name the terms whose interval holds zero, and say how large they may still be."""
     rest = _of(calibration, Finding.NONE)
@@ -129,16 +116,42 @@ def _none(calibration: "Calibration", typical: Typical) -> Iterator[Sentence]:
     )
 
 
-def _shared(calibration: "Calibration") -> Iterator[Sentence]:
-    """Name those whose interval holds zero only because another may stand for them."""
-    terms = _of(calibration, Finding.SHARED)
+# What is said of all terms of one finding together.
+SAID = {
+    Finding.WITHIN: Sentence(
+        "note",
+        "{Figures}: not zero, but no more than the systematic part beside the interval, so it is "
+        "not shown to be the radar's.",
+        "bias",
+    ),
+    Finding.SHARED: Sentence(
+        "note",
+        "Hardly told apart from others, so that zero for one means more of another: {figures}. "
+        "Use them together, as this calibration does.",
+        "separable",
+    ),
+    Finding.ENDLESS: Sentence(
+        "attention",
+        "<b>No interval can be given for {names}</b>: it takes several targets to see how far "
+        "their errors differ. How far off the estimates are is not known.",
+        "bias",
+    ),
+    Finding.UNSEEN: Sentence(
+        "attention",
+        "<b>Not observable here: {names}.</b> Where these targets flew, the geometry does not tell "
+        "it. There is no number to use, and a correction by this calibration holds only for "
+        "targets seen in the same way.",
+        "separable",
+    ),
+}
+
+
+def _said(calibration: "Calibration", kind: Finding) -> Iterator[Sentence]:
+    terms = _of(calibration, kind)
     if terms:
-        yield Sentence(
-            "note",
-            f"Hardly told apart from others, so that zero for one means more of another: "
-            f"{_listed(terms)}. Use them together, as this calibration does.",
-            "separable",
-        )
+        said, figures = SAID[kind], _listed(terms)
+        told = {"figures": figures, "Figures": figures.capitalize(), "names": _words(terms)}
+        yield said._replace(html=said.html.format(**told))
 
 
 def _listed(terms: "dict[str, TermFound]") -> str:
@@ -153,31 +166,8 @@ def _of(calibration: "Calibration", kind: Finding) -> "dict[str, TermFound]":
     return {name: each for name, each in calibration.terms.items() if found[name] is kind}
 
 
-def _endless(calibration: "Calibration") -> Iterator[Sentence]:
-    terms = _of(calibration, Finding.ENDLESS)
-    if terms:
-        yield Sentence(
-            "attention",
-            f"<b>No interval can be given for {_words(terms)}</b>: it takes several targets to see "
-            "how far their errors differ. How far off the estimates are is not known.",
-            "bias",
-        )
-
-
 def _words(terms: "dict[str, TermFound]") -> str:
     return "; ".join(TERMS[name].words for name in terms)
-
-
-def _unseen(calibration: "Calibration") -> Iterator[Sentence]:
-    terms = _of(calibration, Finding.UNSEEN)
-    if terms:
-        yield Sentence(
-            "attention",
-            f"<b>Not observable here: {_words(terms)}.</b> Where these targets flew, the "
-            "geometry does not tell it. There is no number to use, and a correction by this "
-            "calibration holds only for targets seen in the same way.",
-            "separable",
-        )
 
 
 def _directions(calibration: "Calibration") -> Iterator[Sentence]:
