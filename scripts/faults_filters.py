@@ -237,6 +237,9 @@ FAULTS = (
         ("3: (2 / 3, (), 1.1395)", "3: (2 / 3, (), 1.2395)"),
         ("(1.0 - width * width) * np.outer(line", "width * width * np.outer(line"),
         ("whole.mean + x * line", "whole.mean + 0.5 * x * line"),
+    ),
+    *faults(
+        "maths/mixing.py",
         ("log > top, log, top", "log < top, log, top"),
         ("s + (each - nu) * (each - nu)", "s"),
         ("scale = 1.0 / sum(weights)", "scale = 1.0 / len(weights)"),

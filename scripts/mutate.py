@@ -64,6 +64,7 @@ JUDGES = {
     "filters/own_doppler": _tests("statistics/test_own_doppler"),
     "filters/sigma": _tests("laws/test_sigma"),
     "filters/spherical": _tests("laws/test_kept_range", "laws/test_sigma"),
+    "maths/mixing": _tests("laws/test_bent_gaussians", "laws/test_line_of_sight"),
     "filters/line_of_sight": _tests(
         "laws/test_bent_gaussians", "laws/test_line_of_sight", "laws/test_moving_sensor"
     ),

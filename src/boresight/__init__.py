@@ -31,7 +31,7 @@ _WHERE = {
     "models.coordinates": ["CartesianPlots", "PositionSensor"],
     "models.error_model": ["ErrorModel"],
     "models.polar": ["Given"],
-    "models.sensors": ["Bearings", "Pose", "Radar"],
+    "models.sensors": ["Bearings", "ConicalBearings", "Pose", "Radar"],
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
     "catalogue": ["cite"],
     "filters.own_doppler": ["track_range_rate"],

@@ -39,6 +39,7 @@ from boresight.models.motion import Static as Static
 from boresight.models.motion import WithHeightOffset as WithHeightOffset
 from boresight.models.polar import Given as Given
 from boresight.models.sensors import Bearings as Bearings
+from boresight.models.sensors import ConicalBearings as ConicalBearings
 from boresight.models.sensors import Pose as Pose
 from boresight.models.sensors import Radar as Radar
 

@@ -6,12 +6,13 @@ from inspect import getdoc, getmodule
 from typing import Any, NamedTuple
 
 from boresight.errors import UsageError, unknown
-from boresight.filters import ekf, kalman, mekf, sigma, spherical
+from boresight.filters import ekf, kalman, mekf, mgekf, sigma, spherical
 from boresight.filters.converted import Converted
 from boresight.filters.error_model import correct
 from boresight.filters.line_of_sight import LineOfSight
 from boresight.filters.method import Filter
 from boresight.filters.range_rate import RangeRate
+from boresight.mixtures.range_parameterised import RangeParameterised
 
 _FILTERS = {
     f.name: f
@@ -51,6 +52,12 @@ _FILTERS = {
             formula=mekf.update_block,
             summary="modified extended Kalman filter, all components at once",
             paper="aditya",
+        ),
+        Filter(
+            name="mgekf",
+            formula=mgekf.update,
+            summary="modified gain extended Kalman filter, for bearings",
+            paper="pradeep",
         ),
         Filter(
             name="cmkf",
@@ -141,6 +148,17 @@ _FILTERS = {
             summary="Gaussians in the frame of the line of sight, bent as flight is there",
             paper="lineofsight",
             predict=None,
+        ),
+        *(
+            Filter(
+                name=f"rp-{member}",
+                formula=RangeParameterised,
+                summary=f"range-parameterised bank of {member} filters, for bearings only",
+                paper="pradeep",
+                predict=None,
+                settings=(("member", member),),
+            )
+            for member in ("ekf", "mgekf", "ukf", "ckf")
         ),
     )
 }

@@ -21,7 +21,7 @@ import numpy as np
 
 from boresight.errors import UsageError
 from boresight.filters import line_of_sight_plane, line_of_sight_space
-from boresight.filters.line_of_sight_mixture import greatest, matched, mix, split, weigh
+from boresight.filters.line_of_sight_mixture import split
 from boresight.filters.line_of_sight_moments import Part
 from boresight.filters.line_of_sight_plane import Shift, condition
 from boresight.filters.posterior import LOG_TWO_PI, innovation
@@ -29,6 +29,7 @@ from boresight.filters.start import SPEED_MPS, one_plot
 from boresight.filters.steps import State, Surprise
 from boresight.lanes import Leaf, Matrix, Vector
 from boresight.maths import Gaussian, gradient, jacobian, mirror, missing, select
+from boresight.maths.mixing import greatest, matched, mix, weigh
 from boresight.models.components import Component
 from boresight.models.motion import ConstantVelocity, Motion, WithHeightOffset
 from boresight.models.sensors import Sensor

@@ -1,12 +1,11 @@
-"""A normal as several Gaussians, and several Gaussians as one: by their first two moments."""
+"""A normal as several Gaussians that have its first two moments."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from boresight.filters.line_of_sight_moments import NOTHING
-from boresight.maths import Gaussian, mirror, select
+from boresight.maths import Gaussian, mirror
 
 Array = Any
 # A standard normal as Gaussians of one width. Width; (offset, weight) of inner pairs; offset of the
@@ -47,32 +46,3 @@ def split(whole: Gaussian, i: int, parts: int) -> tuple[list[Array], Array, Arra
     line = whole.cov[:, i] / np.sqrt(whole.cov[i, i] + NOTHING)
     cov = mirror(whole.cov - (1.0 - width * width) * np.outer(line, line))
     return [whole.mean + x * line for x in offsets], cov, weights
-
-
-def weigh(logs: Sequence[Any]) -> list[Any]:
-    """Weights that sum to one, from their logarithms, of which one is 0 and none above."""
-    weights = [np.exp(log) for log in logs]
-    scale = 1.0 / sum(weights)
-    return [weight * scale for weight in weights]
-
-
-def mix(weights: Sequence[Any], values: Sequence[Any]) -> Any:
-    """Average of the parts' values."""
-    return sum(w * value for w, value in zip(weights, values, strict=True))
-
-
-def greatest(logs: Sequence[Any]) -> Any:
-    """The largest of some numbers."""
-    top = logs[0]
-    for log in logs[1:]:
-        top = select(log > top, log, top)
-    return top
-
-
-def matched(logs: Sequence[Any], nus: Sequence[Any], variances: Sequence[Any]) -> tuple[Any, Any]:
-    """Innovation and its variance, by the first two moments of the mixture."""
-    top = greatest(logs)
-    weights = weigh([log - top for log in logs])
-    nu = mix(weights, nus)
-    spread = [s + (each - nu) * (each - nu) for each, s in zip(nus, variances, strict=True)]
-    return nu, mix(weights, spread)

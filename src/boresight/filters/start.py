@@ -69,6 +69,50 @@ def one_plot(
     return Gaussian(mean, cov)
 
 
+def on_bearing(
+    z: Array,
+    motion: Motion,
+    sensor: Radar,
+    range_m: float,
+    range_sd_m: float,
+    *,
+    speed_mps: float,
+) -> Gaussian:
+    """On the bearing of a first plot, at a range that is given: its spread turned to the bearing.
+
+    [pradeep] leaves the start open; across the bearing the spread is the range times the angle's.
+
+    Args:
+        z: (lanes, k) plots, radians.
+        motion: state layout, in the plane.
+        sensor: bearings, true or off an axis (then the side towards positive y of its pose).
+        range_m: mean of the range, m.
+        range_sd_m: standard deviation of the range, m.
+        speed_mps: standard deviation of each velocity.
+
+    Returns:
+        mean (lanes, n), cov (lanes, n, n); NaN where no bearing was heard.
+    """
+    z = np.atleast_2d(np.asarray(z, dtype=float))
+    bearing, sigma = np.full(len(z), np.nan), np.zeros(len(z))
+    for name in ("cone_rad", "azimuth_rad"):  # where both are heard, the one without two sides
+        if name in sensor.names:
+            heard = z[:, sensor.names.index(name)]
+            spread = np.radians(_first(getattr(sensor, name.replace("_rad", "_deg"))))
+            sigma = np.where(np.isnan(heard), sigma, spread)
+            bearing = np.where(np.isnan(heard), bearing, heard)
+    position, J = from_polar(np.stack([np.full(len(z), range_m), bearing], axis=-1))
+    polar = np.zeros((len(z), 2, 2))
+    polar[:, 0, 0], polar[:, 1, 1] = range_sd_m**2, sigma**2
+    n, d = len(motion.names), motion.dims
+    mean, cov = np.zeros((len(z), n)), np.zeros((len(z), n, n))
+    mean[:, :2], cov[:, :2, :2] = _in_track_frame(position, J @ polar @ J.mT, sensor)
+    for i in range(d, n):
+        unit = motion.names[i].rsplit("_", 1)[-1]
+        cov[:, i, i] = (speed_mps if i < 2 * d else _SPREADS[unit]) ** 2
+    return Gaussian(mean, cov)
+
+
 def two_plots(first: Array, second: Array, dt: Array, motion: Motion, sensor: Sensor) -> Gaussian:
     """Position from the second plot, velocity from the difference (two-point differencing).
 
@@ -125,12 +169,17 @@ def locate(
     sigma = np.stack([np.broadcast_to(s, len(z)) for s in spreads])
     found = convert(conversion, z[:, columns].T, sigma)
     position, cov = found.mean.T, np.moveaxis(found.cov, -1, 0)
-    if sensor.pose is not None:
-        turn = np.asarray(sensor.pose.rotation, dtype=float).reshape(-1, 3, 3)[0]
-        turn = turn[: motion.dims, : motion.dims]
-        origin = np.asarray(sensor.pose.position_m, dtype=float).reshape(-1, 3)[0, : motion.dims]
-        position, cov = position @ turn + origin, turn.T @ cov @ turn
-    return position, cov
+    return _in_track_frame(position, cov, sensor)
+
+
+def _in_track_frame(position: Array, cov: Array, sensor: Radar) -> tuple[Array, Array]:
+    """Positions (lanes, d) that a sensor sees, and their covariances, where the sensor stands."""
+    if sensor.pose is None:
+        return position, cov
+    d = position.shape[-1]
+    turn = np.asarray(sensor.pose.rotation, dtype=float).reshape(-1, 3, 3)[0, :d, :d]
+    origin = np.asarray(sensor.pose.position_m, dtype=float).reshape(-1, 3)[0, :d]
+    return position @ turn + origin, turn.T @ cov @ turn
 
 
 _GIVE = "give the start: start=Gaussian(mean, cov)"

@@ -50,9 +50,25 @@ def elevation_rad(p: Array, v: Array) -> Any:
     return np.arctan2(p[2], _root(p[0] * p[0] + p[1] * p[1]))
 
 
+def cone_rad(p: Array, v: Array) -> Any:
+    """Angle off the sensor's x axis, 0 to pi, rad: what a line array hears, on a cone about it."""
+    del v
+    return np.arctan2(_root(sum(x * x for x in p[1:])), p[0])
+
+
 def range_rate_mps(p: Array, v: Array) -> Any:
     """Rate of distance, m/s, positive when opening (the opposite sign of a closing speed)."""
     return sum(x * u for x, u in zip(p, v, strict=True)) / range_m(p, v)
+
+
+def azimuth_legs(p: Array) -> tuple[Any, Any]:
+    """(x, y) whose arctan2(y, x) the azimuth is."""
+    return _off_axis(p)
+
+
+def cone_legs(p: Array) -> tuple[Any, Any]:
+    """(x, |y|) whose arctan2(|y|, x) the cone's angle is, in the plane."""
+    return p[0], _root(p[1] * p[1])
 
 
 @dataclass(frozen=True)
@@ -60,15 +76,18 @@ class Component:
     """One measured number of a plot.
 
     Attributes:
-        name: `range_m`, `azimuth_rad`, `elevation_rad`, `height_m`, `pressure_altitude_m`,
-            `range_rate_mps`, or a coordinate.
+        name: `range_m`, `azimuth_rad`, `elevation_rad`, `cone_rad`, `height_m`,
+            `pressure_altitude_m`, `range_rate_mps`, or a coordinate.
         value: formula of the state (n,).
         sigma: standard deviation, in the unit of the name.
+        legs: of an angle in a plane: the state (n,) to (x, y), linear in the state, whose
+            arctan2(y, x) it is; None for everything else.
     """
 
     name: str
     value: Callable[[Array], Any]
     sigma: Any
+    legs: Callable[[Array], tuple[Any, Any]] | None = None
 
     @property
     def is_angle(self) -> bool:
@@ -85,5 +104,6 @@ FORMULAS: dict[str, Callable[[Array, Array], Any]] = {
     "range_m": range_m,
     "azimuth_rad": azimuth_rad,
     "elevation_rad": elevation_rad,
+    "cone_rad": cone_rad,
     "range_rate_mps": range_rate_mps,
 }

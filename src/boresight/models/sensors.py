@@ -16,7 +16,7 @@ from boresight.maths import missing, select
 from boresight.maths.frames import Site, ellipsoid_height
 from boresight.models.atmosphere import EARTH_M, Atmosphere
 from boresight.models.checks import as_number, rotation, standard_deviation, vector
-from boresight.models.components import FORMULAS, Component
+from boresight.models.components import FORMULAS, Component, azimuth_legs, cone_legs
 from boresight.models.motion import OFFSET, Motion
 
 Array = Any
@@ -27,6 +27,7 @@ _SIGMAS = (
     "range_m",
     "azimuth_deg",
     "elevation_deg",
+    "cone_deg",
     "height_m",
     "pressure_altitude_m",
     "range_rate_mps",
@@ -86,6 +87,8 @@ class Radar:
         range_m: slant range, m; None for a sensor that measures no range.
         azimuth_deg: azimuth, degrees.
         elevation_deg: elevation, degrees; None where it is not measured.
+        cone_deg: angle off the pose's x axis, degrees: what a line array hears, which cannot tell
+            one side of itself from the other.
         height_m: reported height above the ellipsoid, m; needs `site`.
         pressure_altitude_m: what a transponder reports, m; needs `site`. It differs from the
             height by an offset that weather makes; a motion `WithHeightOffset` carries that.
@@ -102,6 +105,7 @@ class Radar:
     range_m: Any = None
     azimuth_deg: Any = None
     elevation_deg: Any = None
+    cone_deg: Any = None
     height_m: Any = None
     pressure_altitude_m: Any = None
     range_rate_mps: Any = None
@@ -134,6 +138,7 @@ class Radar:
             "range_m": self.range_m,
             "azimuth_rad": self.azimuth_deg,
             "elevation_rad": self.elevation_deg,
+            "cone_rad": self.cone_deg,
             "height_m": self.height_m,
             "pressure_altitude_m": self.pressure_altitude_m,
             "range_rate_mps": self.range_rate_mps,
@@ -160,7 +165,14 @@ class Radar:
         def value(state: Array) -> Any:
             return formula(*self.relative(state, motion.dims))
 
-        return Component(name, value, sigma)
+        find = _legs(name, motion.dims)
+        if find is None:
+            return Component(name, value, sigma)
+
+        def legs(state: Array) -> tuple[Any, Any]:
+            return find(self.relative(state, motion.dims)[0])
+
+        return Component(name, value, sigma, legs)
 
     def independent(self, z: Array, motion: Motion) -> tuple[Array, tuple[Component, ...]]:
         """The plot and its components; a range rate without what its noise shares with the range's.
@@ -246,6 +258,13 @@ class Radar:
         return value
 
 
+def _legs(name: str, dims: int) -> Callable[[Array], tuple[Any, Any]] | None:
+    """What an angle in a plane is made of; None for other components."""
+    if name == "azimuth_rad":
+        return azimuth_legs
+    return cone_legs if name == "cone_rad" and dims < 3 else None
+
+
 def _check_kinds(radar: Radar) -> None:
     """Something is measured, and a pose and a site are such."""
     if not radar.names:
@@ -277,3 +296,13 @@ def _check_correlation(radar: Radar) -> None:
 def Bearings(*, azimuth_deg: Any, pose: Pose | None = None) -> Radar:
     """A passive sensor that measures bearings only (degrees, standard deviation)."""
     return Radar(azimuth_deg=azimuth_deg, pose=pose)
+
+
+def ConicalBearings(*, cone_deg: Any, pose: Pose) -> Radar:
+    """A line array, towed or on a hull: it hears the angle off its own axis, not which side.
+
+    Args:
+        cone_deg: standard deviation of the angle, degrees.
+        pose: where the array is, and its axis: the first row of `rotation`.
+    """
+    return Radar(cone_deg=cone_deg, pose=pose)

@@ -1,0 +1,1 @@
+"""Several Gaussians for one target."""

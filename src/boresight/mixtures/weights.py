@@ -1,0 +1,60 @@
+"""Weights of the members of a bank, in the log domain: step by step, or in one pass afterwards.
+
+[pradeep] (xi), (xii). Differs from it, by erratum P8: the exponential stands in the numerator, and
+the forecast's own variance is in the likelihood. Weights are logarithms of which the largest is 0.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from boresight.maths import select
+from boresight.maths.mixing import greatest, weigh
+
+Array = Any
+GONE = -1e9  # logarithm of a weight that is no more: its exponential is exactly zero
+
+
+def reweigh(logs: Sequence[Any], likelihoods: Sequence[Any], prune: float) -> list[Any]:
+    """Weights after one measurement: pradeep (xi), then pruning.
+
+    A likelihood that is not finite is that of a member that has diverged: it goes. Where none is
+    left the weights stay as they were. Numbers, arrays and symbols alike.
+
+    Args:
+        logs: logarithms of the weights before it.
+        likelihoods: log-likelihood of the measurement, given each member.
+        prune: a member whose share is below this is no longer in use; the greatest never goes.
+    """
+    heard = [select(abs(each) < np.inf, each, GONE) for each in likelihoods]
+    both = [select(log > GONE, log + each, GONE) for log, each in zip(logs, heard, strict=True)]
+    usable = greatest(both) > 0.5 * GONE
+    raw = [select(usable, new, log) for log, new in zip(logs, both, strict=True)]
+    top = greatest(raw)
+    level = [log - top for log in raw]
+    total = sum(np.exp(log) for log in level)
+    floor = np.log(prune * total) if prune > 0.0 else 0.5 * GONE
+    return [select((log < floor) & (log < 0.0), GONE, log) for log in level]
+
+
+def weights_over_time(likelihoods: Array, *, prune: float = 1e-3) -> Array:
+    """Weights after each step, from likelihoods that were written down while filtering.
+
+    Members do not know of each other, so weighting them afterwards is the same as weighting them
+    step by step.
+
+    Args:
+        likelihoods: (..., steps, members) log-likelihoods, 0 where nothing was heard.
+        prune: as in `reweigh`.
+
+    Returns:
+        (..., steps, members), summing to one over the members.
+    """
+    likelihoods = np.asarray(likelihoods, dtype=float)
+    shares = np.empty_like(likelihoods)
+    logs: Sequence[Any] = [np.zeros(likelihoods.shape[:-2])] * likelihoods.shape[-1]
+    for step in range(likelihoods.shape[-2]):
+        logs = reweigh(logs, np.moveaxis(likelihoods[..., step, :], -1, 0), prune)
+        shares[..., step, :] = np.stack(weigh(logs), axis=-1)
+    return shares
