@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from boresight.errors import UsageError
-from boresight.experiments.formula import Formula
 from boresight.experiments.montecarlo import filtered, run_cell
 from boresight.experiments.scenario import FOOT_M, lookup, paper, scenario_names
 from boresight.experiments.simulate import root_of, simulate
+from boresight.filters.formula import Formula
 from boresight.lanes import Scalar
 from boresight.maths.seeds import Stream, normals
 from boresight.models.coordinates import PositionSensor

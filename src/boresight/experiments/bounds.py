@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from boresight.experiments.formula import Formula
 from boresight.experiments.metrics import ALL, elements
 from boresight.experiments.simulate import Plots, Truth
 from boresight.filters.ekf import condition
+from boresight.filters.formula import Formula
 from boresight.filters.kalman import predict
 from boresight.lanes import Matrix, Rate, Scalar, Symmetric, Vector
 from boresight.maths import Gaussian, gradient, missing, select

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boresight.experiments.formula import Formula
 from boresight.experiments.scenario import Scenario, lookup
+from boresight.filters.formula import Formula
 from boresight.filters.start import one_plot, two_plots
 from boresight.lanes import Matrix, Rate, Scalar, Vector
 from boresight.maths import Gaussian, wrap
