@@ -27,6 +27,7 @@ class Stream(IntEnum):
     NOISE = 1
     START = 2
     ORIGIN = 3
+    PARTICLES = 4
 
 
 def normals(
@@ -59,6 +60,13 @@ def normals(
         bits.state = state
         generator.standard_normal(out=rows[i])
     return rows
+
+
+def generator(seed: int, cell: str, stream: Stream, run: int) -> np.random.Generator:
+    """Numbers of any kind and any count for one run: the stream whose start `normals` draws."""
+    _check(seed, 1, run)
+    key = np.array([seed, _hash(cell)], dtype=np.uint64)
+    return np.random.Generator(np.random.Philox(counter=[0, 0, run, stream], key=key))
 
 
 def _check(seed: int, runs: int, first: int) -> None:
