@@ -25,6 +25,9 @@ PAPERS_SCENARIOS = (
     "aditya-r-as-printed",
     "bordonaro-static",
     "bordonaro-dynamic",
+    "pradeep",
+    "pradeep-straight",
+    "pradeep-anywhere",
 )
 
 
@@ -221,6 +224,19 @@ def test_a_start_from_plots_uses_them_once(begin, used):
     assert np.mean(square) == pytest.approx(1.0, abs=5 * np.sqrt(2 / 900))
     found = filtered("ekf-sequential", world.motion, world.sensor, plots)
     assert np.all(np.isfinite(found.mean))
+
+
+def test_a_start_on_a_bearing_has_the_range_of_the_scenario():
+    world = lookup("pradeep")
+    truth, plots = simulate(world, runs=300, seed=5)
+    assert np.all(np.isnan(plots.z[:, 0]))
+    assert np.linalg.norm(plots.prior.mean[:, :2], axis=1) == pytest.approx(world.range_m)
+    angle = np.arctan2(plots.prior.mean[:, 1], plots.prior.mean[:, 0])
+    off = np.degrees(angle - np.arctan2(truth.start[0, 1], truth.start[0, 0]))
+    assert np.std(off) == pytest.approx(world.sensor.azimuth_deg, rel=5 / np.sqrt(600))
+    assert np.all(np.isfinite(filtered("ekf", world.motion, world.sensor, plots).mean))
+    with pytest.raises(UsageError, match="starts on a bearing, which range_m"):
+        simulate(world, Radar(range_m=5.0), runs=2, seed=1)
 
 
 @pytest.mark.parametrize(

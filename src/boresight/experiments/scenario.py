@@ -18,11 +18,12 @@ from boresight.errors import UsageError, unknown
 from boresight.filters.start import SPEED_MPS
 from boresight.maths import Gaussian
 from boresight.models.motion import ConstantVelocity, Motion, SphericalUnitRate, Static
-from boresight.models.sensors import Radar, Sensor
+from boresight.models.sensors import Bearings, Pose, Radar, Sensor
 
 Array = Any
-Begin = Literal["random draw", "given", "one plot", "two plots"]
+Begin = Literal["random draw", "given", "one plot", "two plots", "on bearing"]
 FOOT_M = 0.3048
+SPEEDS_MPS = {"m/s": 1.0, "knots": 1852.0 / 3600.0}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,9 +40,10 @@ class Scenario:
         draw: makes of standard normals (runs, n) the states (runs, n) where truths start; None:
             all start at `initial`.
         begin: `random draw`: each run's filter starts at its own draw from N(initial, prior_cov);
-            `given`: at `initial`; `one plot`, `two plots`: from the first plots, which are then
-            not used again.
+            `given`: at `initial`; `one plot`, `two plots`, `on bearing`: from the first plots,
+            which are then not used again.
         speed_mps: spread of each velocity that a start from one plot cannot know.
+        range_m, range_sd_m: mean and spread of the range that a start on a bearing cannot know.
         dt_s: s between scans.
         scans: number of scans.
         first_at_start: whether the first scan is at time 0, or one step later.
@@ -57,6 +59,8 @@ class Scenario:
     draw: Callable[[Array], Array] | None = None
     begin: Begin = "random draw"
     speed_mps: float = SPEED_MPS
+    range_m: float = np.nan
+    range_sd_m: float = np.nan
     dt_s: float = 1.0
     scans: int
     first_at_start: bool = True
@@ -179,10 +183,83 @@ def _anywhere(printed: dict[str, Any], normals: Array) -> Array:
     return FOOT_M * np.hstack([position, velocity.T])
 
 
+def _pradeep(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
+    printed, assumed = table["printed"], table["assumed"]
+    unit, near, far = _unit(assumed), assumed["nearest_m"], assumed["farthest_m"]
+    target = [(printed["range_m"], printed["bearing_deg"])]
+    target += [(unit * printed["target_speed"], printed["course_deg"])]
+    speed_sd = assumed["speed_sd_mps"]
+    return Scenario(
+        name=name,
+        motion=ConstantVelocity(accel_mps2=float(assumed["accel_mps2"]), dims=2),
+        sensor=Bearings(
+            azimuth_deg=printed["sigma_bearing_deg"],
+            pose=Pose(position_m=_sailed(table, unit * printed["own_speed"], turns=own["turns"])),
+        ),
+        initial=np.concatenate([_along(*each) for each in target]),
+        prior_cov=np.diag(np.square([(far - near) / 12**0.5] * 2 + [speed_sd] * 2)),
+        draw=partial(_between, assumed) if own["anywhere"] else None,
+        begin="on bearing",
+        speed_mps=speed_sd,
+        range_m=(near + far) / 2.0,
+        range_sd_m=(far - near) / 12**0.5,
+        dt_s=float(assumed["dt_s"]),
+        scans=_scans(table),
+        source=own["where"],
+    )
+
+
+def _scans(table: dict[str, Any]) -> int:
+    return int(table["printed"]["seconds"] / table["assumed"]["dt_s"] + 0.5) + 1
+
+
+def _unit(assumed: dict[str, Any]) -> float:
+    """Of the printed speeds, m/s."""
+    if assumed["speed_unit"] not in SPEEDS_MPS:
+        raise unknown("speed_unit", assumed["speed_unit"], SPEEDS_MPS)
+    return SPEEDS_MPS[assumed["speed_unit"]]
+
+
+def _along(length: Any, direction_deg: Any) -> Array:
+    """North and East of so much in a direction from true North."""
+    angle = np.radians(direction_deg)
+    return length * np.array([np.cos(angle), np.sin(angle)])
+
+
+def _sailed(table: dict[str, Any], speed_mps: float, *, turns: bool) -> Array:
+    """Own ship's positions (1, scans, 3); each step is sailed on the course at its beginning."""
+    assumed, scans = table["assumed"], _scans(table)
+    time_s, names = assumed["dt_s"] * np.arange(scans), ("times_s", "rates_degps", "lasts_s")
+    each = [assumed[f"turn_{name}"] for name in names]
+    if len({len(values) for values in each}) != 1:
+        raise UsageError(
+            f"own ship's turns have {', '.join(str(len(values)) for values in each)} values",
+            next_step=f"give as many in each of {', '.join(f'turn_{name}' for name in names)}",
+        )
+    course = np.full(scans, float(assumed["own_course_deg"]))
+    for start, rate, lasts in zip(*each, strict=True) if turns else ():
+        course += rate * np.clip(time_s - start, 0.0, lasts)
+    path = np.zeros((1, scans, 3))
+    steps = _along(speed_mps * assumed["dt_s"], course[:-1])
+    path[0, 1:, :2] = np.cumsum(steps, axis=1).T
+    return path
+
+
+def _between(assumed: dict[str, Any], normals: Array) -> Array:
+    """States of targets on any bearing, of any velocity, in any cell of the range alike."""
+    from scipy.special import ndtr
+
+    edges = np.geomspace(assumed["nearest_m"], assumed["farthest_m"], assumed["cells"] + 1)
+    where = np.interp(ndtr(normals[:, 0]), np.linspace(0.0, 1.0, len(edges)), edges)
+    position = _along(where, 360.0 * ndtr(normals[:, 1]))
+    return np.hstack([position.T, assumed["speed_sd_mps"] * normals[:, 2:]])
+
+
 _BUILDERS: dict[str, Callable[[str, dict[str, Any], dict[str, Any]], Scenario]] = {
     "kashyap": _kashyap,
     "aditya": _aditya,
     "bordonaro": _bordonaro,
+    "pradeep": _pradeep,
 }
 
 

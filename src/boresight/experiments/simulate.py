@@ -10,14 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from boresight.errors import UsageError
 from boresight.experiments.scenario import Scenario, lookup
 from boresight.filters.formula import Formula
-from boresight.filters.start import one_plot, two_plots
+from boresight.filters.start import on_bearing, one_plot, two_plots
 from boresight.lanes import Matrix, Rate, Scalar, Vector
 from boresight.maths import Gaussian, wrap
 from boresight.maths.seeds import Stream, normals
 from boresight.models.motion import Motion
-from boresight.models.sensors import Sensor
+from boresight.models.sensors import Radar, Sensor
 
 Array = Any
 _SINGULAR = 1e-12  # of a variance: less is rounding left over from the noise's other directions
@@ -107,10 +108,23 @@ def _plots(world: Scenario, sensor: Sensor, z: Array, normal: Array) -> Plots:
     elif world.begin == "one plot":
         prior = one_plot(z[:, 0], world.motion, sensor, speed_mps=world.speed_mps)
         z, dt = _spent(z, dt, 1)
+    elif world.begin == "on bearing":
+        prior = _on_bearing(world, sensor, z[:, 0])
+        z, dt = _spent(z, dt, 1)
     else:
         prior = two_plots(z[:, 0], z[:, 1], dt[0, 1], world.motion, sensor)
         z, dt = _spent(z, dt, 2)
     return Plots(world.time_s, z, dt, prior)
+
+
+def _on_bearing(world: Scenario, sensor: Sensor, z: Array) -> Gaussian:
+    if not (isinstance(sensor, Radar) and {"azimuth_rad", "cone_rad"} & set(sensor.names)):
+        raise UsageError(
+            f"scenario {world.name!r} starts on a bearing, which {', '.join(sensor.names)} is not",
+            next_step="use bs.Bearings(azimuth_deg=..., pose=...)",
+        )
+    known = (world.range_m, world.range_sd_m)
+    return on_bearing(z, world.motion, sensor, *known, speed_mps=world.speed_mps)
 
 
 def _spent(z: Array, dt: Array, plots: int) -> tuple[Array, Array]:
