@@ -1,4 +1,4 @@
-"""The report: one self-contained HTML page about one recording, tracked, calibrated, or both."""
+"""The report: one self-contained HTML page about what was tracked, calibrated or analysed."""
 
 from boresight.interfaces.report.page import Report, report
 

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from boresight.errors import OutputError, UsageError
 from boresight.interfaces.answers import plain
-from boresight.interfaces.report import calibrated, charts, sections, tracks
+from boresight.interfaces.report import calibrated, charts, sections, tma_page, tracks
 from boresight.interfaces.report.sections import Part
 
 if TYPE_CHECKING:
     from boresight.calibration.result import Calibration
+    from boresight.tma.result import TmaResult
     from boresight.tracking.result import Comparison, TrackingResult
 
 # The library compiles its drawing commands, hence unsafe-eval; nothing may be fetched at all.
@@ -68,8 +69,9 @@ def report(
     *,
     as_seen: "Sequence[Comparison]" = (),
     calibration: "Calibration | None" = None,
+    motion: "TmaResult | None" = None,
 ) -> Report:
-    """Make the report of a tracked recording, of a radar's calibration, or of both.
+    """Make the report of a tracked recording, of a radar's calibration, of both, or of contacts.
 
     Args:
         result: what the tracker found.
@@ -79,6 +81,7 @@ def report(
         as_seen: the same filters against the truth as the sensor, with its known systematic
             errors, would see it without noise.
         calibration: of the radar.
+        motion: what target motion analysis says of each contact.
 
     Raises:
         UsageError: there is nothing to report.
@@ -89,6 +92,8 @@ def report(
         parts.append(tracks.part(result, comparisons, as_seen, inspection))
     if calibration is not None:
         parts.append(calibrated.part(calibration, {} if parts else inspection))
+    if motion is not None:
+        parts.append(tma_page.part(motion))
     if not parts:
         raise UsageError(
             "a report needs tracks, a calibration, or both", next_step="report(tracks, calibration)"

@@ -1,0 +1,89 @@
+"""A contact's history as its charts draw it: columns as floats, thinned, times on one axis."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boresight.interfaces.report import charts
+from boresight.interfaces.report.residuals import Floats, column
+
+if TYPE_CHECKING:
+    from boresight.tma.result import TargetMotion
+
+MOST_STEPS = 900  # of one contact that are drawn; a screen has hardly more columns
+SURE = 0.99  # of a side's weight: `TargetMotion.decided`
+SHADE = "rgba(213,94,0,0.07)"
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One contact, ready to be drawn.
+
+    Attributes:
+        motion: the contact's answer.
+        stem: what the names of its panels begin with.
+    """
+
+    motion: "TargetMotion"
+    stem: str = ""
+
+    @cached_property
+    def kept(self) -> NDArray[np.intp]:
+        """(kept,) the steps that are drawn: every n-th, and the last."""
+        return thinned(self.motion.history.height)
+
+    def __getitem__(self, name: str) -> Floats:
+        """(kept,) a column of the history."""
+        return column(self.motion.history, name)[self.kept]
+
+    @cached_property
+    def time(self) -> Floats:
+        """(kept,) s of the file's clock."""
+        return self["time_s"]
+
+    @cached_property
+    def told(self) -> NDArray[np.bool_]:
+        """(kept,) whether bearings alone tell the range."""
+        return np.asarray(self["observable"] == 1.0)
+
+    @cached_property
+    def sided(self) -> NDArray[np.bool_]:
+        """(kept,) whether the weights have decided for one side, or sides are known."""
+        cells = self.motion.cells
+        if not np.any(cells.side):
+            return np.ones(len(self.kept), dtype=bool)
+        starboard = np.asarray(cells.weights)[self.kept][:, np.asarray(cells.side) > 0].sum(1)
+        return np.asarray(np.abs(starboard - 0.5) >= SURE - 0.5)
+
+    @property
+    def title(self) -> str:
+        """Name of the contact."""
+        return self.motion.contact.name
+
+
+def thinned(count: int, most: int = MOST_STEPS) -> NDArray[np.intp]:
+    """Return at most about `most` of `count` places, evenly, the last among them."""
+    step = -(-count // most) or 1
+    return np.unique(np.append(np.arange(0, count, step), max(count - 1, 0)))[:count]
+
+
+def stretches(is_so: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first and last index of each stretch of true values."""
+    change = np.diff(np.concatenate([[0], is_so.astype(int), [0]]))
+    return list(zip(np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1, strict=True))
+
+
+def unwrapped(deg: Floats) -> Floats:
+    """Return angles that run on past 360 degrees; gaps are stepped over."""
+    out, known = deg.copy(), np.isfinite(deg)
+    out[known] = np.unwrap(deg[known], period=360.0)
+    return out
+
+
+def text(x: Any, y: Any, words: str, **options: Any) -> dict[str, Any]:
+    """A small note in a chart."""
+    style = {"font": {"size": 11, "color": charts.MUTED}, "showarrow": False}
+    return {"x": x, "y": y, "text": words, "bgcolor": "rgba(255,255,255,0.75)"} | style | options
