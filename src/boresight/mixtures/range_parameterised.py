@@ -209,11 +209,11 @@ def _check(sensor: Sensor) -> None:
 
 
 def _origin(motion: Motion, sensor: Sensor) -> tuple[Array, Array]:
-    """Position (d,) and axes (d, d) of the sensor in the track frame."""
+    """Position (d,) and axes (d, d) of the sensor in the track frame, at the first step."""
     pose, d = getattr(sensor, "pose", None), motion.dims
     if pose is None:
         return np.zeros(d), np.eye(d)
-    return pose.position_m[:d], pose.rotation[:d, :d]
+    return pose.position_m.reshape(-1, 3)[0, :d], pose.rotation.reshape(-1, 3, 3)[0, :d, :d]
 
 
 def _at_range(

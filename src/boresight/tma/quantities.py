@@ -1,0 +1,239 @@
+"""What a bank's mixture says of range, bearing, course and speed.
+
+[pradeep] section 3 reads the state's mean. Differs from it: moments and credible regions are those
+of the quantity itself over the whole mixture, as before own ship turns the state's mean is the
+truth of no target. Polar columns everywhere: range (m), bearing, course (degrees true), speed
+(m/s).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from boresight.maths import wrap
+from boresight.mixtures.bank import Bank
+from boresight.tma.contact import Contact
+from boresight.tma.planar import Axes, own_axes, quadrature, spots
+from boresight.tma.regions import angle_regions, radius_regions
+from boresight.tma.result import Quantity, Side
+
+Array = Any
+QUANTITIES = ("range_m", "bearing_deg", "course_deg", "speed_mps")
+NEGLIGIBLE = 1e-6  # of the weight: what a region does not look at
+DECIDED = 0.99  # of the weight on one side of the array
+_SIDES = {-1.0: "port", 1.0: "starboard"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """What a mixture says after one bearing; as in `TargetMotion`."""
+
+    range_m: Quantity
+    bearing_deg: Quantity
+    course_deg: Quantity
+    speed_mps: Quantity
+    mean: Array
+    cov: Array
+    sides: tuple[Side, ...]
+    decided: bool
+
+
+def as_polar(states: Array, position: Array) -> Array:
+    """Polar columns (..., 4) of states (..., 4) as heard from (..., 2); angles from 0 to 360."""
+    states = np.asarray(states, dtype=float)
+    x, v = states[..., :2] - position, states[..., 2:4]
+    bearing, course = (np.degrees(np.arctan2(p[..., 1], p[..., 0])) % 360.0 for p in (x, v))
+    return np.stack([np.hypot(*_xy(x)), bearing, course, np.hypot(*_xy(v))], axis=-1)
+
+
+def polar_moments(
+    weights: Array, means: Array, covs: Array, position: Array
+) -> tuple[Array, Array]:
+    """Mean and standard deviation of range, bearing, course and speed under a mixture.
+
+    Args:
+        weights: (..., cells), summing to one; a cell without weight may hold anything.
+        means: (..., cells, n), North, East (m), their rates (m/s), and whatever follows.
+        covs: (..., cells, n, n).
+        position: (..., 2), own ship's North and East, m.
+
+    Returns:
+        Two of (..., 4) polar columns. Angles' means are circular, from 0 to 360, their spreads are
+        of what is left, wrapped.
+    """
+    weights = np.asarray(weights, dtype=float)
+    alive = weights > 0.0
+    here = np.broadcast_to(np.asarray(position)[..., None, :], (*alive.shape, 2))[alive]
+    axes = _planes(np.asarray(means)[alive], np.asarray(covs)[alive], here)
+    parts = [np.zeros((*alive.shape, 2)) for _ in range(4)]
+    for part, found in zip(parts, _cell_moments(axes), strict=True):
+        part[alive] = found
+    radius, radius_var, angle, angle_var = parts
+    w = weights[..., None]
+    middle, spread = _mixed(w, radius, radius_var)
+    pull = w * np.exp(-angle_var / 2.0)  # a direction that is not known has no say
+    centre = np.arctan2(np.sum(pull * np.sin(angle), -2), np.sum(pull * np.cos(angle), -2))
+    off, width = _mixed(w, wrap(angle - centre[..., None, :]), angle_var)
+    turned, width = np.degrees(centre + off) % 360.0, np.degrees(width)
+    return _columns(middle, turned), _columns(spread, width)
+
+
+def regions(weights: Array, means: Array, covs: Array, position: Array) -> dict[str, Any]:
+    """Credible regions of one mixture: by quantity, then by level in per cent.
+
+    Args:
+        weights: (cells,), summing to one; a cell without weight may hold anything.
+        means: (cells, n).
+        covs: (cells, n, n).
+        position: (2,).
+    """
+    alive = weights > NEGLIGIBLE
+    axes = _planes(means[alive], covs[alive], np.asarray(position)[None])
+    place, velocity = (Axes(*(each[:, i] for each in axes)) for i in (0, 1))
+    w = weights[alive]
+    return {
+        "range_m": radius_regions(w, place),
+        "bearing_deg": angle_regions(w, place),
+        "course_deg": angle_regions(w, velocity),
+        "speed_mps": radius_regions(w, velocity),
+    }
+
+
+def describe(bank: Bank, contact: Contact, step: int = -1, *, observable: bool) -> Answer:
+    """What is known after one bearing.
+
+    Args:
+        bank: every cell, by step.
+        contact: what was heard, and from where.
+        step: which bearing; the last one unless told.
+        observable: whether the bearings tell the range: without, range, course and speed have
+            regions and no estimate.
+
+    Once a side of the array is decided, all but `sides` is said of that side alone; before that
+    bearing and course have no estimate, since between the sides there is nothing.
+    """
+    weights, here = bank.weights[step], contact.position_m[step]
+    parts = [(_SIDES[s], *_one_side(weights, bank.side, s)) for s in _SIDES]
+    parts = sorted((p for p in parts if p[1] > 0.0), key=lambda p: -p[1])
+    means, covs = bank.means[step], bank.covs[step]
+    told = dict.fromkeys(QUANTITIES, observable) | {"bearing_deg": True}
+    sides = tuple(
+        Side(name=name, probability=share, **_say(w, means, covs, here, told))
+        for name, share, w in parts
+    )
+    decided = not sides or sides[0].probability >= DECIDED
+    if sides and decided:
+        weights = parts[0][2]
+    if not decided:
+        told |= {"bearing_deg": False, "course_deg": False}
+    mean, cov = _moments(weights, means, covs)
+    said = _say(weights, means, covs, here, told)
+    return Answer(mean=mean, cov=cov, sides=sides, decided=decided, **said)
+
+
+def history(bank: Bank, contact: Contact) -> dict[str, Array]:
+    """What was known after each bearing, of the side that is the heavier at the end.
+
+    Returns:
+        (steps,) each: mean and spread of the four quantities (`range_m`, `range_sd_m`, ...), the
+        mean's `north_m` and `east_m`, `range_low_m` and `range_high_m` (ends of the 90 % region,
+        each cell's range taken as normal), `innovation_deg`, `innovation_sd_deg` and `nis` of the
+        mixture's forecast (NaN where nothing was heard), and `side_probability` (1 for true
+        bearings).
+    """
+    weights, probability = _heavier_side(bank)
+    estimate, sd = polar_moments(weights, bank.means, bank.covs, contact.position_m)
+    place = np.sum(weights[..., None] * np.where(weights[..., None] > 0.0, bank.means, 0.0), axis=1)
+    found = {name: estimate[:, i] for i, name in enumerate(QUANTITIES)}
+    found |= {_sd(name): sd[:, i] for i, name in enumerate(QUANTITIES)}
+    return found | {
+        "north_m": place[:, 0],
+        "east_m": place[:, 1],
+        "side_probability": probability,
+    }
+
+
+def _planes(means: Array, covs: Array, position: Array) -> Axes:
+    """Own axes, each (N, 2), of the position relative to own ship and of the velocity."""
+    pairs = np.stack([means[:, :2] - position, means[:, 2:4]], axis=1)
+    blocks = np.stack([covs[:, :2, :2], covs[:, 2:4, 2:4]], axis=1)
+    return own_axes(pairs, blocks)
+
+
+def _cell_moments(axes: Axes) -> tuple[Array, Array, Array, Array]:
+    """Mean and variance of radius and angle of Gaussians; angles about their centre, wrapped."""
+    points, w = quadrature()
+    radius, angle = spots(axes, points)
+    middle = radius @ w
+    centre = axes.turn + np.arctan2(axes.across, axes.along)
+    off = wrap(angle - centre[..., None])
+    aside = off @ w
+    return (
+        middle,
+        (radius - middle[..., None]) ** 2 @ w,
+        centre + aside,
+        (off - aside[..., None]) ** 2 @ w,
+    )
+
+
+def _mixed(w: Array, means: Array, variances: Array) -> tuple[Array, Array]:
+    """Mean and standard deviation of mixtures over the axis before the last."""
+    mean = np.sum(w * means, axis=-2)
+    apart = means - mean[..., None, :]
+    return mean, np.sqrt(np.sum(w * (variances + apart * apart), axis=-2))
+
+
+def _columns(radius: Array, angle: Array) -> Array:
+    """Polar columns of (..., 2) radii and angles of position and velocity."""
+    return np.stack([radius[..., 0], angle[..., 0], angle[..., 1], radius[..., 1]], axis=-1)
+
+
+def _moments(weights: Array, means: Array, covs: Array) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n) of one mixture."""
+    alive = weights > 0.0
+    w, means, covs = weights[alive], means[alive], covs[alive]
+    mean = w @ means
+    apart = means - mean
+    return mean, np.einsum("c,cij->ij", w, covs + apart[:, :, None] * apart[:, None, :])
+
+
+def _say(w: Array, means: Array, covs: Array, here: Array, told: dict[str, bool]) -> dict[str, Any]:
+    """The four quantities of one mixture, with estimates of those that are told."""
+    estimate, sd = polar_moments(w, means, covs, here)
+    found = regions(w, means, covs, here)
+    return {
+        name: Quantity(
+            estimate=float(estimate[i]) if told[name] else None,
+            sd=float(sd[i]) if told[name] else None,
+            regions=found[name],
+        )
+        for i, name in enumerate(QUANTITIES)
+    }
+
+
+def _one_side(weights: Array, side: Array, which: float) -> tuple[float, Array]:
+    """Probability of one side, and the weights (cells,) given that."""
+    kept = np.where(side == which, weights, 0.0)
+    share = float(kept.sum())
+    return share, kept / share if share > 0.0 else kept
+
+
+def _heavier_side(bank: Bank) -> tuple[Array, Array]:
+    """Weights (steps, cells) given the side that is the heavier at the end, and its probability."""
+    if not bank.side.any():
+        return bank.weights, np.ones(len(bank.weights))
+    lean = bank.weights[-1] @ bank.side
+    kept = np.where(bank.side == (1.0 if lean > 0.0 else -1.0), bank.weights, 0.0)
+    share = kept.sum(axis=1)
+    return kept / share[:, None], share
+
+
+def _sd(name: str) -> str:
+    """`range_m` to `range_sd_m`."""
+    stem, unit = name.rsplit("_", 1)
+    return f"{stem}_sd_{unit}"
+
+
+def _xy(pairs: Array) -> tuple[Array, Array]:
+    return pairs[..., 0], pairs[..., 1]
