@@ -111,7 +111,8 @@ def bearing_particles(
         z: (runs, k) first plots, radians.
         motion: in the plane.
         sensor: bearings, true or off an axis.
-        nearest_m, farthest_m: between which ranges, m.
+        nearest_m: least range, m.
+        farthest_m: greatest range, m.
         cells: how many; their limits grow geometrically.
         speed_mps: spread of each velocity.
         count: particles of a run.
@@ -155,6 +156,7 @@ class _World:
             outputs={"loglik": (Scalar(), Rate.LANE)},
         )
         self.slots, self.kernel = program.state, make_kernel(program)
+        self.roots: dict[float, Array] = {}
 
     def _step(self, state: Mapping[str, Any], inputs: Any) -> tuple[Any, Any]:
         """One particle: it moves, and says how likely the plot is."""
@@ -177,11 +179,13 @@ class _World:
         }
 
     def noise(self, dt: float, count: int, random: np.random.Generator) -> Array:
-        """What the motion leaves out, (count, n)."""
-        Q = np.asarray(self.motion.noise(dt), dtype=float)
-        if not Q.any():
-            return np.zeros((count, len(Q)))
-        return random.standard_normal((count, len(Q))) @ _root(Q).T
+        """What the motion leaves out in dt seconds, (count, n)."""
+        if dt not in self.roots:
+            self.roots[dt] = _root(np.asarray(self.motion.noise(dt), dtype=float))
+        root = self.roots[dt]
+        if not root.any():
+            return np.broadcast_to(0.0, (count, len(root)))
+        return random.standard_normal((count, len(root))) @ root.T
 
 
 @dataclass(frozen=True)
@@ -192,19 +196,19 @@ class _Renewal:
     bandwidth: float
 
     def __call__(self, places: Array, weights: Array, random: np.random.Generator) -> Array:
-        """Equally likely particles (count, n) with the mean and covariance of the weighted ones.
+        """Equally likely particles (n, count) with the mean and covariance of the weighted ones.
 
         Systematic resampling; then [liu2001], with h the bandwidth: drawn to the mean by
         sqrt(1 - h^2), and spread by a normal kernel of h^2 times the covariance.
         """
-        count, n = places.shape
+        n, count = places.shape
         edges = np.cumsum(weights)
         marks = (np.arange(count) + random.random()) * (edges[-1] / count)
-        chosen = places[np.minimum(np.searchsorted(edges, marks), count - 1)]
+        chosen = places[:, np.minimum(np.searchsorted(edges, marks), count - 1)]
         h = self.bandwidth * (4.0 / (n + 2.0) / count) ** (1.0 / (n + 4.0))
         mean, cov = _moments(places, weights)
-        kernel = random.standard_normal((count, n)) @ _root(cov).T
-        return mean + np.sqrt(1.0 - h * h) * (chosen - mean) + h * kernel
+        kernel = _root(cov) @ random.standard_normal((n, count))
+        return mean[:, None] + np.sqrt(1.0 - h * h) * (chosen - mean[:, None]) + h * kernel
 
 
 def _run(
@@ -219,34 +223,38 @@ def _run(
         given = world.at(run, k)
         given["noise"] = world.noise(float(given["dt"]), count, random)
         states, told = world.kernel.run(states, given, 1)
-        loglik[k], logs = _reweigh(logs, told["loglik"])
-        places, weights = states["place"], np.exp(logs)
+        loglik[k], logs, weights = _reweigh(logs, told["loglik"])
+        places = np.moveaxis(states.data, 1, 0).reshape(n, -1)[:, :count]
         means[k], covs[k] = _moments(places, weights)
         effective[k] = 1.0 / (weights @ weights)
         if effective[k] < renewal.fraction * count:
-            states = pack_states(world.slots, {"place": renewal(places, weights, random)})
+            renewed = renewal(places, weights, random)
+            states = pack_states(world.slots, {"place": renewed.T})
             logs = np.full(count, -np.log(count))
     return means, covs, effective, loglik
 
 
-def _reweigh(logs: Array, likelihoods: Array) -> tuple[float, Array]:
-    """Log-likelihood of a plot, and the weights' logarithms after it.
+def _reweigh(logs: Array, likelihoods: Array) -> tuple[float, Array, Array]:
+    """Log-likelihood of a plot, and the weights after it: their logarithms, and themselves.
 
     A plot that no particle explains has likelihood zero, and changes no weight.
     """
-    new = np.nan_to_num(logs + likelihoods, nan=-np.inf)
+    new = logs + likelihoods
+    new = np.where(new > -np.inf, new, -np.inf)  # a particle that is not finite explains nothing
     top = new.max()
     if top == -np.inf:
-        return top, logs
-    total = top + np.log(np.exp(new - top).sum())
-    return total, new - total
+        return top, logs, np.exp(logs)
+    weights = np.exp(new - top)
+    total = weights.sum()
+    level = top + np.log(total)
+    return level, new - level, weights / total
 
 
 def _moments(places: Array, weights: Array) -> tuple[Array, Array]:
-    """Mean (n,) and cov (n, n) of weighted particles (count, n)."""
-    mean = weights @ places
-    apart = places - mean
-    return mean, (apart * weights[:, None]).T @ apart
+    """Mean (n,) and cov (n, n) of weighted particles (n, count)."""
+    mean = places @ weights
+    apart = places - mean[:, None]
+    return mean, (apart * weights) @ apart.T
 
 
 def _root(cov: Array) -> Array:
