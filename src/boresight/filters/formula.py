@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from boresight.lanes import Kernel, Leaf, Rate, make_kernel, pack_states, trace
+from boresight.lanes import Kernel, Leaf, Rate, States, make_kernel, pack_states, trace
 from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, structure, with_numbers
 from boresight.models.sensors import Sensor
@@ -27,7 +27,7 @@ class Formula:
         motion, sensor: the models; their numbers are inputs of the kernel.
         state: leaves that travel from step to step.
         inputs: leaves and how often they change.
-        outputs: leaves that are written at every step.
+        outputs: leaves that are written at every step; none where only the last state counts.
     """
 
     step: Step
@@ -52,10 +52,16 @@ class Formula:
         self, start: Mapping[str, Array], inputs: Mapping[str, Array], steps: int
     ) -> dict[str, Array]:
         """Run all lanes, from start (lanes, *shape) to outputs (lanes, steps, *shape)."""
+        return self.carry(start, inputs, steps)[1]
+
+    def carry(
+        self, start: Mapping[str, Array], inputs: Mapping[str, Array], steps: int
+    ) -> tuple[States, dict[str, Array]]:
+        """As `run`, with what travelled from step to step, as it is after the last one."""
         rated = {n: rate_of(n, value, leaf) for n, (value, leaf) in self.numbers().items()}
         kernel = _kernel(self, tuple((name, rate) for name, (rate, _) in rated.items()))
         values = {name: value for name, (_, value) in rated.items()} | dict(inputs)
-        return kernel.run(pack_states(kernel.program.state, start), values, steps)[1]
+        return kernel.run(pack_states(kernel.program.state, start), values, steps)
 
     def numbers(self) -> dict[str, tuple[Any, Leaf]]:
         """Numbers of both models, by name."""
