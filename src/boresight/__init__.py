@@ -35,6 +35,7 @@ _WHERE = {
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
     "catalogue": ["cite"],
     "filters.own_doppler": ["track_range_rate"],
+    "filters.particle": ["bearing_particles", "particle_filter"],
     "experiments.scenario": ["Scenario"],
     "experiments.simulate": ["simulate"],
     "experiments.metrics": ["anees", "rmse"],

@@ -11,6 +11,8 @@ from boresight.experiments.reproduce import reproduce as reproduce
 from boresight.experiments.scenario import Scenario as Scenario
 from boresight.experiments.simulate import simulate as simulate
 from boresight.filters.own_doppler import track_range_rate as track_range_rate
+from boresight.filters.particle import bearing_particles as bearing_particles
+from boresight.filters.particle import particle_filter as particle_filter
 from boresight.interfaces.calibration import calibrate as calibrate
 from boresight.interfaces.calibration import read_calibration as read_calibration
 from boresight.interfaces.calibration import write_calibration as write_calibration

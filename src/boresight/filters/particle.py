@@ -74,16 +74,16 @@ def particle_filter(
         UsageError: particles, dt or plots that do not fit.
     """
     z, clouds = np.asarray(z, dtype=float), np.asarray(particles, dtype=float)
-    runs, n = len(z), len(motion.names)
+    runs, n, k = len(z), len(motion.names), len(sensor.names)
     if clouds.ndim == 2:
         clouds = np.broadcast_to(clouds, (runs, *clouds.shape))
-    if z.ndim != 3 or clouds.ndim != 3 or (len(clouds), clouds.shape[2]) != (runs, n):
+    fits = z.ndim == 3 and clouds.ndim == 3 and z.shape[2] == k
+    if not fits or (len(clouds), clouds.shape[2]) != (runs, n):
         raise UsageError(
             f"plots of shape {z.shape} with particles of shape {np.shape(particles)}",
-            why=f"(runs, steps, {len(sensor.names)}) and (runs, count, {n}) are needed",
+            why=f"(runs, steps, {k}) and (runs, count, {n}) are needed",
         )
-    world = _World(motion, sensor, z, dt)
-    renewal = _Renewal(fraction, bandwidth)
+    world, renewal = _World(motion, sensor, z, dt), _Renewal(fraction, bandwidth)
     found = [
         _run(world, run, clouds[run], renewal, generator(seed, "particles", Stream.PARTICLES, run))
         for run in range(runs)
@@ -121,6 +121,12 @@ def bearing_particles(
     Returns:
         (runs, count, n).
     """
+    heard = np.isfinite(np.asarray(z, dtype=float)).any(axis=-1)
+    if not heard.all():
+        raise UsageError(
+            f"nothing was heard in the first plot of run {np.flatnonzero(~heard)[0]}",
+            why="particles are drawn on a bearing",
+        )
     edges, borders = np.geomspace(nearest_m, farthest_m, cells + 1), np.linspace(0, 1, cells + 1)
     cone = np.array([name == "cone_rad" for name in sensor.names])
     degrees = [getattr(sensor, name.replace("_rad", "_deg")) for name in sensor.names]
@@ -130,9 +136,9 @@ def bearing_particles(
     for run, plot in enumerate(np.asarray(z, dtype=float)):
         random = generator(seed, "particles", Stream.START, run)
         ranges = np.interp((np.arange(count) + random.random(count)) / count, borders, edges)
-        heard = plot + sigma[run] * random.standard_normal((count, len(plot)))
-        heard[random.random(count) < 0.5] *= np.where(cone, -1.0, 1.0)
-        start = on_bearing(heard, motion, sensor, ranges, 0.0, speed_mps=speed_mps)
+        angles = plot + sigma[run] * random.standard_normal((count, len(plot)))
+        angles[random.random(count) < 0.5] *= np.where(cone, -1.0, 1.0)
+        start = on_bearing(angles, motion, sensor, ranges, 0.0, speed_mps=speed_mps)
         spread = np.sqrt(np.diagonal(start.cov, axis1=1, axis2=2))
         spread[:, :2] = 0.0  # the place is drawn already
         clouds.append(start.mean + spread * random.standard_normal(spread.shape))
@@ -143,10 +149,18 @@ class _World:
     """Both models, their numbers at every run and step, and the kernel that takes a step."""
 
     def __init__(self, motion: Motion, sensor: Sensor, z: Array, dt: Array) -> None:
-        self.motion, self.sensor, self.steps = motion, sensor, z.shape[1]
+        self.motion, self.sensor, (runs, self.steps, _) = motion, sensor, z.shape
         found = numbers(motion, "motion") | numbers(sensor, "sensor")
         given = found | {"dt": (dt, Scalar()), "z": (z, Vector(z.shape[2]))}
         self.rated = {name: rate_of(name, *pair) for name, pair in given.items()}
+        leading = {Rate.FIXED: (), Rate.LANE: (runs,), Rate.STEP: (self.steps,)}
+        for name, (rate, value) in self.rated.items():
+            lead = leading.get(rate, (runs, self.steps))
+            if value.shape[: len(lead)] != lead:
+                raise UsageError(
+                    f"{name} has shape {value.shape}",
+                    why=f"the plots have {runs} runs and {self.steps} steps",
+                )
         leaf = Vector(len(motion.names))
         inputs = {name: (shape, Rate.FIXED) for name, (_, shape) in given.items()}
         program = trace(
@@ -195,6 +209,11 @@ class _Renewal:
     fraction: float
     bandwidth: float
 
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0.0 <= value <= 1.0:
+                raise UsageError(f"{name}={value!r} is not a share, from 0 to 1")
+
     def __call__(self, places: Array, weights: Array, random: np.random.Generator) -> Array:
         """Equally likely particles (n, count) with the mean and covariance of the weighted ones.
 
@@ -240,7 +259,6 @@ def _reweigh(logs: Array, likelihoods: Array) -> tuple[float, Array, Array]:
     A plot that no particle explains has likelihood zero, and changes no weight.
     """
     new = logs + likelihoods
-    new = np.where(new > -np.inf, new, -np.inf)  # a particle that is not finite explains nothing
     top = new.max()
     if top == -np.inf:
         return top, logs, np.exp(logs)

@@ -73,7 +73,7 @@ def on_bearing(
     z: Array,
     motion: Motion,
     sensor: Radar,
-    range_m: float,
+    range_m: Array,
     range_sd_m: float,
     *,
     speed_mps: float,
@@ -86,7 +86,7 @@ def on_bearing(
         z: (lanes, k) plots, radians.
         motion: state layout, in the plane.
         sensor: bearings, true or off an axis (then the side towards positive y of its pose).
-        range_m: mean of the range, m.
+        range_m: mean of the range, m: one, or one a lane.
         range_sd_m: standard deviation of the range, m.
         speed_mps: standard deviation of each velocity.
 
