@@ -21,7 +21,14 @@ from boresight.models.parameters import numbers, rate_of
 from boresight.models.sensors import Sensor
 
 Array = Any
-__all__ = ["BatchEstimate", "Prior", "batch_map", "gaussian_prior", "velocity_prior"]
+__all__ = [
+    "BatchEstimate",
+    "Prior",
+    "batch_map",
+    "gaussian_prior",
+    "range_prior",
+    "velocity_prior",
+]
 ITERATIONS = 60
 SETTLED = 1e-7  # of a standard deviation: a step so short is the last
 _ROUNDING = 1e-13  # of a cost: what a sum over plots leaves undecided
@@ -39,6 +46,21 @@ def velocity_prior(motion: Motion, speed_mps: float) -> Prior:
     weights = np.zeros(n)
     weights[d : 2 * d] = 1.0 / speed_mps**2
     return Prior(np.zeros(n), np.diag(weights))
+
+
+def range_prior(motion: Motion, speed_mps: float, nearest_m: float, farthest_m: float) -> Prior:
+    """As `velocity_prior`, with a range: the mean and spread of one uniform between limits.
+
+    Without it, a target that no manoeuvre has told the range of settles on own ship itself.
+
+    Args:
+        motion: state layout.
+        speed_mps: standard deviation of each velocity.
+        nearest_m: lower limit of the distance at the first plot, m.
+        farthest_m: upper limit, m.
+    """
+    middle, spread = (nearest_m + farthest_m) / 2.0, (farthest_m - nearest_m) / np.sqrt(12.0)
+    return velocity_prior(motion, speed_mps)._replace(range_m=middle, range_sd_m=float(spread))
 
 
 def gaussian_prior(start: Gaussian) -> Prior:

@@ -15,6 +15,7 @@ from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
 
 Array = Any
+_FLOOR_M = 1e-3  # as in `models.components`: a target at the sensor has no direction
 
 
 class Prior(NamedTuple):
@@ -23,10 +24,14 @@ class Prior(NamedTuple):
     Attributes:
         mean: (n,) or (lanes, n), at the first plot.
         information: (n, n) or (lanes, n, n), positive semidefinite.
+        range_m, range_sd_m: distance from the sensor at the first plot, and its spread; None for
+            none. Unlike a mean it does not say in which direction.
     """
 
     mean: Array
     information: Array
+    range_m: float | None = None
+    range_sd_m: float | None = None
 
 
 class Normal(NamedTuple):
@@ -110,7 +115,23 @@ class Problem:
         weight = np.broadcast_to(self.prior.information, (lanes, n, n))[lane]
         off = mean - first
         pull = (weight @ off[..., None])[..., 0]
-        return Normal(weight, pull, 0.5 * np.sum(off * pull, axis=-1))
+        known = Normal(weight, pull, 0.5 * np.sum(off * pull, axis=-1))
+        return known if self.prior.range_m is None else self._with_range(known, first)
+
+    def _with_range(self, known: Normal, first: Array) -> Normal:
+        """The distance that the prior says, as one more residual."""
+        d, pose = self.motion.dims, getattr(self.sensor, "pose", None)
+        origin = np.zeros(d) if pose is None else pose.position_m.reshape(-1, 3)[0, :d]
+        away, sigma = first[:, :d] - origin, self.prior.range_sd_m
+        length = np.maximum(np.sqrt(np.sum(away**2, axis=1)), _FLOOR_M)
+        h = np.zeros_like(first)
+        h[:, :d] = away / (length * sigma)[:, None]
+        off = (self.prior.range_m - length) / sigma
+        return Normal(
+            known.information + h[:, :, None] * h[:, None, :],
+            known.gradient + h * off[:, None],
+            known.cost + 0.5 * off**2,
+        )
 
 
 def _equations(n: int) -> dict[str, Leaf]:
