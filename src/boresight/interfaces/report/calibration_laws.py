@@ -106,7 +106,9 @@ def _quantiles(channel: Channel, rest: Left, law: "Law") -> Panel:
 
     share, y = _chosen(rest)
     x = _law_quantile(law, share)
-    low, high = (_law_quantile(law, each) for each in _band(share, float(rest.weights.sum())))
+    low, high = (
+        _law_quantile(law, each) for each in quantile_band(share, float(rest.weights.sum()))
+    )
     packed = charts.short(x, 16)
     normal = charts.line(
         packed, charts.short(rest.sd() * ndtri(share)), charts.INK, hoverinfo="skip"
@@ -147,7 +149,7 @@ def _chosen(rest: Left) -> tuple[Floats, Floats]:
     return rest.share[chosen], rest.values[chosen]
 
 
-def _band(share: Floats, number: float) -> list[Floats]:
+def quantile_band(share: Floats, number: float) -> list[Floats]:
     """Return between which shares of the law 95 % of such quantiles lie: a beta distribution."""
     from scipy.special import betaincinv
 

@@ -155,9 +155,15 @@
     if (series && !hasWebGl()) {
       for (const trace of charts["plan-chart"].data) trace.type = "scatter";
     }
-    for (const [name, chart] of Object.entries(charts)) {
-      await Plotly.newPlot(name, chart.data, chart.layout,
-        { ...calm, scrollZoom: name === "plan-chart" });
+    const draw = (name) => Plotly.newPlot(name, charts[name].data, charts[name].layout,
+      { ...calm, scrollZoom: name === "plan-chart" });
+    for (const name of Object.keys(charts)) {
+      const fold = byId(name).closest("details:not([open])");
+      if (fold) {  // drawn when it is opened: before, it has no size
+        fold.addEventListener("toggle", () => draw(name), { once: true });
+        continue;
+      }
+      await draw(name);
       await paint();
     }
     if (series) explore(charts, series);

@@ -138,11 +138,16 @@ def _contents(kept: Sequence[Block]) -> str:
 
 
 def _verdict(part: Part, places: set[str], *, is_alone: bool) -> str:
-    items = "\n".join(_sentence(each, places) for each in part.sentences)
     remarks = "".join(f"<li>{escape(each)}</li>" for each in part.remarks)
     head = "" if is_alone else f"<h3>{part.subject}</h3>"
     more = f"<h3>Remarks of the {part.kind}</h3><ul>{remarks}</ul>" if remarks else ""
-    return f'{head}<ul class="verdict">{items}</ul>{more}'
+    return f"{head}{points(part.sentences, places)}{more}"
+
+
+def points(sentences: Sequence[Sentence], places: set[str]) -> str:
+    """Return a verdict's sentences, each with a link to its evidence if that is in `places`."""
+    items = "\n".join(_sentence(each, places) for each in sentences)
+    return f'<ul class="verdict">{items}</ul>'
 
 
 def _sentence(each: Sentence, places: set[str]) -> str:

@@ -83,6 +83,32 @@ def unwrapped(deg: Floats) -> Floats:
     return out
 
 
+def line(x: Floats, y: Floats, color: str, **options: Any) -> charts.Chart:
+    """A trace through points, broken at gaps; a position within 300 km keeps 2 m."""
+    packed = charts.short(x, 16), charts.short(y, 16)
+    return charts.line(*packed, color, connectgaps=False) | options
+
+
+def band(x: Floats, low: Floats, high: Floats, name: str) -> list[charts.Chart]:
+    """Shade between `low` and `high`, stretch by stretch: where one is unknown is no band."""
+    found = []
+    for first, last in stretches(np.isfinite(low) & np.isfinite(high)):
+        along, below, above = (charts.short(each[first : last + 1], 16) for each in (x, low, high))
+        found += charts.band(along, below, above, name)
+    return found
+
+
+def floats(values: Floats) -> list[float | None]:
+    """Return numbers as JSON holds them; styles and hover texts take no typed arrays."""
+    return [float(f"{each:.6g}") if np.isfinite(each) else None for each in values]
+
+
+def dots(x: Floats, y: Floats, color: str, *, opacity: float = 1.0, **marker: Any) -> charts.Chart:
+    """A trace of markers."""
+    style = {"marker": {"color": color, **marker}, "opacity": opacity, "showlegend": False}
+    return line(x, y, color, mode="markers") | style
+
+
 def text(x: Any, y: Any, words: str, **options: Any) -> dict[str, Any]:
     """A small note in a chart."""
     style = {"font": {"size": 11, "color": charts.MUTED}, "showarrow": False}
