@@ -24,12 +24,27 @@ from boresight.maths import Gaussian, gradient
 from boresight.models.parameters import rate_of
 from boresight.models.sensors import Pose
 from lanes.machines import COMPILED, EVERY, compiled_targets, kernel_for, name_of, targets
-from laws.enrolled import CURVED, FILTERS, LINEAR_WORLDS, POLAR, POLAR_WORLDS, SPACE, World, tilted
+from laws.enrolled import (
+    BEARING_WORLDS,
+    BY_EAR,
+    CURVED,
+    FILTERS,
+    LINEAR_WORLDS,
+    POLAR,
+    POLAR_WORLDS,
+    SPACE,
+    World,
+    tilted,
+)
 
 PAIRS = [
     pytest.param(entry, world, id=f"{entry}-{world}")
-    for entry in FILTERS
-    for world in (POLAR_WORLDS[:1] if entry.curved else LINEAR_WORLDS[:1])
+    for entries, world in (
+        ([e for e in FILTERS if not e.curved], LINEAR_WORLDS[0]),
+        (CURVED, POLAR_WORLDS[0]),
+        (BY_EAR, BEARING_WORLDS[0]),
+    )
+    for entry in entries
 ]
 everyone = pytest.mark.parametrize(("entry", "world"), PAIRS)
 STEPS = 5

@@ -19,7 +19,7 @@ from boresight.models.motion import (
     Static,
     WithHeightOffset,
 )
-from boresight.models.sensors import Pose, Radar
+from boresight.models.sensors import Bearings, ConicalBearings, Pose, Radar
 
 km, deg, mrad = 1e3, np.pi / 180, 1e-3
 SITE = Site(latitude_deg=51.1, longitude_deg=1.2, height_m=45.0)
@@ -60,6 +60,15 @@ ALL = Radar(
 )
 POINT = PositionSensor(x_m=20.0, y_m=35.0, z_m=50.0)
 FLAT = PositionSensor(x_m=20.0, y_m=35.0)
+AFLOAT = Pose(
+    position_m=np.array([4 * km, -7 * km, 0.0]),
+    rotation=turned(0.4),
+    velocity_mps=np.array([4.0, -9.0, 0.0]),
+)
+LISTENING = Bearings(azimuth_deg=0.8)
+HEARD = Bearings(azimuth_deg=0.8, pose=AFLOAT)
+CONE = ConicalBearings(cone_deg=0.8, pose=AFLOAT)
+DOPPLER = Radar(azimuth_deg=0.8, range_rate_mps=2.0, pose=AFLOAT)
 CHIRP = Radar(range_m=30.0, azimuth_deg=0.8, range_rate_mps=2.0, range_rate_correlation=-0.7)
 OBLONG = CartesianPlots(cov=np.array([[900.0, -500.0], [-500.0, 400.0]]))
 
@@ -111,6 +120,9 @@ class Entry:
         own_state: what it keeps is curved in the motion's coordinates. So a linear world is none to
             it, and a start is not told bit for bit; what it keeps is.
         straight: it follows straight flight only, and refuses other motions.
+        bank: it begins on the direction of a start and not at its range, so that a start is not
+            told as it was given; and it has no use for a sensor without an angle, so a linear world
+            is none to it either.
     """
 
     name: str
@@ -119,6 +131,7 @@ class Entry:
     by_axes: bool = False
     own_state: bool = False
     straight: bool = False
+    bank: bool = False
 
     def __str__(self):
         return "-".join([self.name, *(str(v).replace(" ", "") for v in self.settings.values())])
@@ -151,6 +164,8 @@ FILTERS = (
     Entry("mekf", {"mu": "none", "added_variance": False}),
     Entry("mekf-block"),
     Entry("mekf-block", {"mu": False, "added_variance": False}),
+    Entry("mgekf"),
+    Entry("mgekf", {"gain": "small angle", "widest_deg": 30.0}),
     Entry("cmkf"),
     Entry("cmkf-d"),
     Entry("cmkf-d", {"conversion": "cmkf-d-t"}),
@@ -170,6 +185,13 @@ FILTERS = (
     Entry("line-of-sight", {"told": "unbiased"}, own_state=True, straight=True),
 )
 CURVED = tuple(entry for entry in FILTERS if entry.curved)
+BY_EAR = (
+    Entry("rp-ekf", own_state=True, bank=True),
+    Entry("rp-ekf", {"cells": 3, "prune": 0.0}, own_state=True, bank=True),
+    Entry("rp-mgekf", own_state=True, bank=True),
+    Entry("rp-ukf", by_axes=True, own_state=True, bank=True),
+    Entry("rp-ckf", by_axes=True, own_state=True, bank=True),
+)
 
 LINEAR_WORLDS = (World(SPACE, POINT), World(PLANE, FLAT), World(PLANE, OBLONG))
 POLAR_WORLDS = (
@@ -180,6 +202,7 @@ POLAR_WORLDS = (
     World(WithHeightOffset(inner=SPACE, drift_m_per_sqrt_s=2.0), ALL),
     World(PLANE, CHIRP),
 )
+BEARING_WORLDS = (World(PLANE, HEARD), World(PLANE, CONE), World(PLANE, DOPPLER))
 MOTIONS = (
     PLANE,
     SPACE,

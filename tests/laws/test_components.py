@@ -9,11 +9,11 @@ from boresight.maths import gradient
 from boresight.maths.angles import wrap
 from boresight.maths.frames import ecef_from_enu, geodetic_from_ecef
 from boresight.models.components import FORMULAS, Component
-from laws.enrolled import LINEAR_WORLDS, POLAR_WORLDS, SITE, World
+from laws.enrolled import BEARING_WORLDS, LINEAR_WORLDS, POLAR_WORLDS, SITE, World
 from oracles import filters as textbook
 
 seeds = st.integers(0, 2**32)
-WORLDS = (*POLAR_WORLDS, *LINEAR_WORLDS)
+WORLDS = (*POLAR_WORLDS, *LINEAR_WORLDS, *BEARING_WORLDS)
 km, mm = 1e3, 1e-3
 each = pytest.mark.parametrize(
     ("world", "index"),
@@ -146,6 +146,6 @@ def test_standard_deviations_arrive_in_the_unit_of_the_plot():
 @pytest.mark.parametrize("name", [*FORMULAS, "height_m", "x_m"])
 def test_angles_wrap_and_nothing_else_does(name):
     component = Component(name, None, 1.0)
-    expected = -0.2 if name in ("azimuth_rad", "elevation_rad") else 2 * np.pi - 0.2
+    expected = -0.2 if name in ("azimuth_rad", "elevation_rad", "cone_rad") else 2 * np.pi - 0.2
     assert component.residual(2 * np.pi + 0.1, 0.3) == pytest.approx(expected)
     assert component.residual(2.0, -0.9) == pytest.approx(2.9)  # nearly half a turn is no turn

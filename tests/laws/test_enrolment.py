@@ -6,11 +6,11 @@ import inspect
 from boresight import catalogue
 from boresight.models import coordinates, motion, sensors
 from boresight.models.components import FORMULAS
-from laws.enrolled import FILTERS, LINEAR_WORLDS, MOTIONS, POLAR_WORLDS
+from laws.enrolled import BEARING_WORLDS, BY_EAR, FILTERS, LINEAR_WORLDS, MOTIONS, POLAR_WORLDS
 
 
 def test_every_filter_of_the_catalogue_is_enrolled():
-    assert {entry.name for entry in FILTERS} == set(catalogue.names())
+    assert {entry.name for entry in (*FILTERS, *BY_EAR)} == set(catalogue.names())
 
 
 def test_every_motion_is_enrolled():
@@ -23,7 +23,7 @@ def test_every_motion_is_enrolled():
 
 
 def test_every_component_and_sensor_is_enrolled():
-    worlds = (*POLAR_WORLDS, *LINEAR_WORLDS)
+    worlds = (*POLAR_WORLDS, *LINEAR_WORLDS, *BEARING_WORLDS)
     measured = {name for world in worlds for name in world.sensor.names}
     fields = {
         f.name.replace("_deg", "_rad")

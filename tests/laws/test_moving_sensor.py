@@ -12,7 +12,19 @@ import pytest
 from boresight.filters.recursion import run_recursion
 from boresight.maths import Gaussian
 from boresight.models.sensors import Pose, Radar
-from laws.enrolled import CHIRP, CURVED, PLANAR, PLANE, POLAR, SPACE, Entry, World, turned
+from laws.enrolled import (
+    BY_EAR,
+    CHIRP,
+    CURVED,
+    LISTENING,
+    PLANAR,
+    PLANE,
+    POLAR,
+    SPACE,
+    Entry,
+    World,
+    turned,
+)
 
 LANES, STEPS, DT = 6, 12, 2.0
 ORIGIN, VELOCITY = np.array([9e3, 2e4, -500.0]), np.array([80.0, -35.0, 4.0])
@@ -35,6 +47,14 @@ def flown(world, seed=7):
         z.append([[c.value(x) + c.sigma * rng.normal() for c in parts] for x in truth])
         truth = np.array([world.motion.move(x, DT) for x in truth])
     return start, np.moveaxis(np.array(z), 0, 1)
+
+
+SAILING = [(e, World(PLANE, LISTENING)) for e in BY_EAR]
+
+
+@pytest.mark.parametrize(("entry", "world"), SAILING, ids=str)
+def test_a_listener_that_turns_and_moves_gives_the_same_track(entry, world):
+    test_a_turning_and_moving_sensor_gives_the_same_track(entry, world)
 
 
 @pytest.mark.parametrize("world", [*RICH, *PLAIN], ids=str)
