@@ -11,7 +11,16 @@ from typing import Annotated, TypeAlias
 from cyclopts import App, CycloptsError, Parameter
 
 from boresight.errors import BoresightError, UsageError
-from boresight.interfaces import calibrating, door, jobs, pages, terminal
+from boresight.interfaces import (
+    analysing,
+    calibrating,
+    contacts,
+    door,
+    jobs,
+    options,
+    pages,
+    terminal,
+)
 from boresight.interfaces.answers import Answer
 from boresight.interfaces.terminal import Manner
 
@@ -20,42 +29,6 @@ FLAGS = {"--json": "as_json", "--quiet": "is_quiet", "--debug": "is_debug"}
 EPILOGUE = "Every command also takes --json, --quiet and --debug: see boresight --help."
 
 Job: TypeAlias = Callable[[Manner], Answer]
-File = Annotated[Path, Parameter(help="ASTERIX recording (raw, pcap, ...), CSV or Parquet.")]
-Strict = Annotated[
-    bool,
-    Parameter(
-        negative="", show_default=False, help="Stop at the first damage instead of skipping it."
-    ),
-]
-Columns = Annotated[
-    str | None, Parameter(help="For a table, its columns as OURS=THEIRS,... (range_m=rng,...).")
-]
-Site = Annotated[
-    str | None,
-    Parameter(
-        allow_leading_hyphen=True,
-        help="Place of the sensor as LAT,LON,H: degrees, degrees, metres above the ellipsoid. "
-        "Left out: what the radar says of itself (CAT034), if it does.",
-    ),
-]
-Air = Annotated[
-    str | None,
-    Parameter(
-        show_default=lambda _: "none",
-        help="The air whose delay is taken out of the ranges: none, effective-earth, exponential.",
-    ),
-]
-Filters = Annotated[
-    list[str] | None,
-    Parameter(
-        negative="",
-        show_default=lambda _: door.FILTER,
-        help="Which filter: see boresight cite. Several, or all, are compared on the same plots; "
-        "the tracks are those of the first.",
-    ),
-]
-Output = Annotated[Path, Parameter(alias="-o", help="Folder for report.html and the tables.")]
-Figures = Annotated[Path | None, Parameter(alias="-o", help="Folder for the paper's figures.")]
 
 app = App(
     name="boresight",
@@ -67,21 +40,23 @@ app = App(
 
 
 @app.command
-def inspect(file: File, /, *, strict: Strict = False, columns: Columns = None) -> Job:
+def inspect(
+    file: options.File, /, *, strict: options.Strict = False, columns: options.Columns = None
+) -> Job:
     """Say what a recording holds: format, sensors, times, damage."""
     return partial(jobs.inspect, file, strict=strict, columns=_columns(columns))
 
 
 @app.command
 def track(
-    file: File,
+    file: options.File,
     /,
     *,
-    site: Site = None,
+    site: options.Site = None,
     sensor: Annotated[
         str | None, Parameter(help="Track this sensor's plots, SAC/SIC as inspect prints it.")
     ] = None,
-    filter: Filters = None,  # noqa: A002 - the option is --filter
+    filter: options.Filters = None,  # noqa: A002 - the option is --filter
     calibration: Annotated[
         Path | None,
         Parameter(
@@ -89,10 +64,10 @@ def track(
             "leaves uncertain is in the covariances."
         ),
     ] = None,
-    atmosphere: Air = None,
-    strict: Strict = False,
-    columns: Columns = None,
-    output: Output | None = None,
+    atmosphere: options.Air = None,
+    strict: options.Strict = False,
+    columns: options.Columns = None,
+    output: options.Output | None = None,
 ) -> Job:
     """Turn a recording into tracks, tables and a report."""
     return partial(
@@ -111,7 +86,7 @@ def track(
 
 @app.command
 def calibrate(
-    file: File,
+    file: options.File,
     /,
     *,
     reference: Annotated[
@@ -122,7 +97,7 @@ def calibrate(
             "track that aircraft told the radar (Mode S)."
         ),
     ],
-    site: Site = None,
+    site: options.Site = None,
     sensor: Annotated[
         str | None, Parameter(help="Calibrate this sensor, SAC/SIC as inspect prints it.")
     ] = None,
@@ -134,17 +109,17 @@ def calibrate(
             "measured) and site.",
         ),
     ] = None,
-    atmosphere: Air = None,
+    atmosphere: options.Air = None,
     gate: Annotated[
         float | None,
         Parameter(help="How far from its plot a target may be, m, where the radar hears no names."),
     ] = None,
-    strict: Strict = False,
-    columns: Columns = None,
+    strict: options.Strict = False,
+    columns: options.Columns = None,
     reference_columns: Annotated[
         str | None, Parameter(help="The same for a table of reference (latitude_deg=lat,...).")
     ] = None,
-    output: Output | None = None,
+    output: options.Output | None = None,
 ) -> Job:
     """Find what is wrong with a radar, against GPS, ADS-B or downlink."""
     return partial(
@@ -164,7 +139,58 @@ def calibrate(
 
 
 @app.command
-def demo(*, output: Output = Path("boresight-demo")) -> Job:
+def tma(
+    bearings: options.BearingsFile,
+    /,
+    *,
+    own_ship: options.OwnShip,
+    filter: options.MotionFilter = None,  # noqa: A002 - the option is --filter
+    ranges: options.Ranges = None,
+    cells: options.CellCount = None,
+    prune: options.Prune = None,
+    speed: options.Speed = None,
+    track: options.Contact = None,
+    sigma: options.Sigma = None,
+    degrees: options.Degrees = False,
+    declination: options.Declination = None,
+    own_ship_clock: options.OwnShipClock = 0.0,
+    tow: options.Tow = 0.0,
+    spacing: options.Spacing = None,
+    sound_speed: options.SoundSpeed = 1500.0,
+    limits: options.Limits = None,
+    columns: options.Columns = None,
+    own_ship_columns: options.OwnShipColumns = None,
+    output: options.Output | None = None,
+) -> Job:
+    """From bearings and own ship's track to range, course and speed."""
+    nearest, farthest = door.ranges(ranges) if ranges is not None else (None, None)
+    return partial(
+        analysing.analyse,
+        bearings,
+        own_ship=own_ship,
+        folder=output,
+        filter=filter or contacts.FILTER,
+        criteria=door.limits(limits) if limits is not None else None,
+        cells=cells,
+        nearest_m=nearest,
+        farthest_m=farthest,
+        prune=prune,
+        speed_mps=speed,
+        track=track,
+        sigma_deg=sigma,
+        degrees=degrees,
+        declination_deg=declination,
+        own_ship_clock_s=own_ship_clock,
+        tow_m=tow,
+        array_spacing_m=spacing,
+        sound_speed_mps=sound_speed,
+        columns=_columns(columns),
+        own_ship_columns=_columns(own_ship_columns, "--own-ship-columns"),
+    )
+
+
+@app.command
+def demo(*, output: options.Output = Path("boresight-demo")) -> Job:
     """Calibrate and track the built-in recording, against known truth."""
     return partial(jobs.demo, output)
 
@@ -180,7 +206,7 @@ def reproduce(
         list[str] | None,
         Parameter(negative="", help="What the paper leaves open: dt_s=2. May be repeated."),
     ] = None,
-    output: Figures = None,
+    output: options.Figures = None,
 ) -> Job:
     """Repeat a paper's tables and claims, with a verdict for each."""
     assumed = door.assumptions(assume or [])

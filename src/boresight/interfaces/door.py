@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from boresight.filters.method import Filter
     from boresight.maths.frames import Site
     from boresight.models.atmosphere import Atmosphere
+    from boresight.tma.result import Criteria
 
 
 def site(text: str) -> "Site":
@@ -198,3 +199,52 @@ def folder(path: Path) -> Path:
             next_step="name a folder you may write to, with -o DIR",
         ) from error
     return path
+
+
+def ranges(text: str) -> tuple[float, float]:
+    """Read `NEAREST,FARTHEST`, in metres.
+
+    Raises:
+        UsageError: not two numbers.
+    """
+    try:
+        nearest, farthest = (float(part) for part in text.split(","))
+    except ValueError:
+        raise UsageError(
+            f"--ranges {text!r} is not two numbers parted by a comma",
+            next_step="give metres, the nearest first: --ranges 500,30000",
+        ) from None
+    return nearest, farthest
+
+
+# What a user writes for the limits of convergence, and their names.
+LIMITS = {
+    "range": "range_percent",
+    "bearing": "bearing_deg",
+    "course": "course_deg",
+    "speed": "speed_mps",
+    "confidence": "confidence",
+}
+
+
+def limits(text: str) -> "Criteria":
+    """Read when an answer has converged: `range=10,bearing=0.5`; the rest stays as usual.
+
+    Raises:
+        UsageError: an unknown name, or what is no number or out of range.
+    """
+    from boresight.tma.result import Criteria
+
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, _, value = (each.strip() for each in part.partition("="))
+        if name not in LIMITS:
+            raise unknown("limit", name, LIMITS)
+        try:
+            found[LIMITS[name]] = float(value)
+        except ValueError:
+            raise UsageError(
+                f"--limits: {name}={value!r} is not a number",
+                next_step="for example: --limits range=10,course=5",
+            ) from None
+    return Criteria(**found)

@@ -13,6 +13,7 @@ COMMANDS = {
     "inspect": "Say what a recording holds: format, sensors, times, damage.",
     "calibrate": "Find what is wrong with a radar, against GPS, ADS-B or downlink.",
     "track": "Turn a recording into tracks, tables and a report.",
+    "tma": "From bearings and own ship's track to range, course and speed.",
     "demo": "Calibrate and track the built-in recording, against known truth.",
     "reproduce": "Repeat a paper's tables and claims, with a verdict for each.",
     "cite": "Print a filter's reference, and where the code differs from it.",

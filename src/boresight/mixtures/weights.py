@@ -5,10 +5,13 @@ the forecast's own variance is in the likelihood. Weights are logarithms of whic
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
+from math import prod
 from typing import Any
 
 import numpy as np
 
+from boresight.lanes import Kernel, Rate, Vector, make_kernel, pack_states, trace
 from boresight.maths import select
 from boresight.maths.mixing import greatest, weigh
 
@@ -52,9 +55,27 @@ def weights_over_time(likelihoods: Array, *, prune: float = 1e-3) -> Array:
         (..., steps, members), summing to one over the members.
     """
     likelihoods = np.asarray(likelihoods, dtype=float)
-    shares = np.empty_like(likelihoods)
-    logs: Sequence[Any] = [np.zeros(likelihoods.shape[:-2])] * likelihoods.shape[-1]
-    for step in range(likelihoods.shape[-2]):
-        logs = reweigh(logs, np.moveaxis(likelihoods[..., step, :], -1, 0), prune)
-        shares[..., step, :] = np.stack(weigh(logs), axis=-1)
-    return shares
+    *lanes, steps, members = likelihoods.shape
+    kernel = _pass(members, float(prune))
+    start = pack_states(kernel.program.state, {"logs": np.zeros((prod(lanes), members))})
+    flat = likelihoods.reshape(-1, steps, members)
+    return kernel.run(start, {"heard": flat}, steps)[1]["shares"].reshape(likelihoods.shape)
+
+
+@lru_cache(maxsize=32)
+def _pass(members: int, prune: float) -> Kernel:
+    """The step of weights alone, compiled."""
+
+    def step(state: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
+        logs = np.array(reweigh(list(state["logs"]), list(inputs["heard"]), prune))
+        return {"logs": logs}, {"shares": np.array(weigh(list(logs)))}
+
+    several = Vector(members)
+    return make_kernel(
+        trace(
+            step,
+            state={"logs": several},
+            inputs={"heard": (several, Rate.EACH)},
+            outputs={"shares": (several, Rate.EACH)},
+        )
+    )

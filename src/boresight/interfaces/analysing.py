@@ -1,0 +1,146 @@
+"""The work of `boresight tma`: read, analyse, write down, answer."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from boresight.interfaces import door, screens_tma
+from boresight.interfaces.answers import Answer
+from boresight.interfaces.contacts import tma
+from boresight.interfaces.recordings import sha256
+from boresight.interfaces.terminal import Manner, progress
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from boresight.tma.result import Batch, Residuals, Side, TargetMotion, TmaResult
+
+REPORT, TARGET = "report.html", "target.geojson"
+HISTORY, HISTORY_CSV = "history.parquet", "history.csv"
+STATE = ("north_m", "east_m", "north_mps", "east_mps")
+QUANTITIES = ("range_m", "bearing_deg", "course_deg", "speed_mps")
+
+
+def analyse(
+    bearings: Path,
+    manner: Manner,
+    *,
+    own_ship: Path,
+    folder: Path | None,
+    **asked: Any,
+) -> Answer:
+    """Analyse every contact of a file; with a folder, write the answer down."""
+    target = door.folder(folder) if folder else None
+    with progress(f"Analysing {bearings.name}", manner):
+        found = tma(bearings, own_ship, **asked)
+    about = {
+        "file": bearings.name,
+        "sha256": sha256(bearings),
+        "own_ship": own_ship.name,
+        "own_ship_sha256": sha256(own_ship),
+    }
+    outputs = write(found, target, about, manner) if target else []
+    return Answer(
+        content=content(found, outputs),
+        screen=lambda width: screens_tma.analysed(found, outputs, width),
+        remarks=[*found.remarks, *found.main.contact.remarks, *found.main.remarks],
+    )
+
+
+def write(found: "TmaResult", folder: Path, about: Mapping[str, Any], manner: Manner) -> list[str]:
+    """Write the report and the tables into a folder; return the paths."""
+    from boresight.formats.output import write_table
+    from boresight.interfaces.report import report
+
+    with progress("Writing", manner):
+        page = report(motion=found, inspection=dict(about), command=manner.command)
+        table = histories(found)
+        names = [HISTORY, HISTORY_CSV, *([TARGET] if "latitude_deg" in table.columns else [])]
+        paths = [page.save(folder / REPORT)]
+        paths += [write_table(table, folder / name, "target motion") for name in names]
+    return [str(path) for path in paths]
+
+
+def histories(found: "TmaResult") -> "pl.DataFrame":
+    """Every contact's history in one table; with places on Earth where the plane has one."""
+    import polars as pl
+
+    return pl.concat([_history(each) for each in found.contacts], how="diagonal_relaxed")
+
+
+def _history(one: "TargetMotion") -> "pl.DataFrame":
+    import polars as pl
+
+    from boresight.maths.frames import geodetic_from_enu
+
+    table = one.history.select(pl.lit(one.contact.name).alias("track"), pl.all())
+    if one.contact.site is None:
+        return table
+    # A place is told only where the range was.
+    known = table["observable"].to_numpy()
+    north, east = (table[f"{name}_m"].to_numpy() for name in ("north", "east"))
+    plane = np.stack([east, north, 0.0 * north], axis=-1)
+    latitude, longitude, _ = geodetic_from_enu(plane, one.contact.site)
+    return table.with_columns(
+        pl.when(pl.Series(known)).then(pl.Series(latitude)).alias("latitude_deg"),
+        pl.when(pl.Series(known)).then(pl.Series(longitude)).alias("longitude_deg"),
+    )
+
+
+def content(found: "TmaResult", outputs: Sequence[str]) -> dict[str, Any]:
+    """The object that `boresight tma --json` prints: the busiest contact, then all of them."""
+    answers = [told(each) for each in found.contacts]
+    return answers[0] | {
+        "contacts": answers if len(answers) > 1 else [],
+        "remarks": [*found.remarks, *answers[0]["remarks"]],
+        "outputs": list(outputs),
+    }
+
+
+def told(one: "TargetMotion") -> dict[str, Any]:
+    """One contact's answer, as JSON holds it."""
+    seen = asdict(one.observability)
+    del seen["by_step"], seen["observable"]
+    return {
+        "track": one.contact.name,
+        "filter": one.filter,
+        "bearings": one.bearings,
+        "first_s": float(one.contact.time_s[0]),
+        "last_s": float(one.contact.time_s[-1]),
+        "observable": one.observable,
+        "observability": seen,
+        "converged_s": one.converged_s,
+        "convergence": asdict(one.convergence),
+        "criteria": asdict(one.criteria),
+        **{name: asdict(getattr(one, name)) for name in QUANTITIES},
+        "state": {"names": STATE, "mean": one.mean, "cov": one.cov} if one.observable else None,
+        "plane": asdict(one.contact.site) if one.contact.site else None,
+        "sides": [_side(each) for each in one.sides],
+        "side_decided": one.decided,
+        "cells": {
+            "range_m": one.cells.range_m,
+            "side": one.cells.side,
+            "weights": one.cells.weights[-1],
+        },
+        "batch": _batch(one.batch) if one.batch and one.observable else None,
+        "residuals": _residuals(one.residuals) if one.residuals else None,
+        "settings": one.settings,
+        "remarks": [*one.contact.remarks, *one.remarks],
+    }
+
+
+def _side(side: "Side") -> dict[str, Any]:
+    return asdict(side)
+
+
+def _batch(batch: "Batch") -> dict[str, Any]:
+    told = {name: asdict(getattr(batch, name)) for name in QUANTITIES}
+    return {"cost": batch.cost, "settled": batch.converged, **told}
+
+
+def _residuals(residuals: "Residuals") -> dict[str, Any]:
+    tests = [asdict(each) for each in residuals.tests]
+    return {"false_alarm": residuals.false_alarm, "tests": tests}

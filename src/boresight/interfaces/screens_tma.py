@@ -1,0 +1,143 @@
+"""What a person sees of target motion analysis in the terminal."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from boresight.interfaces.report.words import figure
+from boresight.interfaces.screens import table, text, written
+from boresight.maths.digits import decimals, with_unit
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from boresight.tma.result import Quantity, Region, Side, TargetMotion, TmaResult
+
+ROWS = (
+    ("range", "range_m", "m"),
+    ("bearing", "bearing_deg", "°"),
+    ("course", "course_deg", "°"),
+    ("speed", "speed_mps", "m/s"),
+)
+FULL = 3  # contacts that are each shown in full; more are shown in one table
+
+
+def analysed(found: "TmaResult", outputs: Sequence[str], width: int) -> "list[RenderableType]":
+    """The screen of `boresight tma`."""
+    del width
+    many = len(found.contacts) > FULL
+    parts = [_overview(found)] if many else [p for each in found.contacts for p in _contact(each)]
+    return [*parts, *written(outputs)]
+
+
+def _contact(one: "TargetMotion") -> "list[RenderableType]":
+    span = one.contact.time_s[-1] - one.contact.time_s[0]
+    head = (
+        f"{one.contact.name}: {figure(one.bearings)} bearings over {_lasting(span)}, {one.filter}"
+    )
+    parts = [text(head, "bold"), text(_known(one), "" if one.observable else "yellow"), text("")]
+    if one.sides and not one.decided:
+        return [*parts, *(_grid(_chance(side), side) for side in one.sides), _when(one)]
+    return [*parts, _grid("At the last bearing", one), _when(one)]
+
+
+def _chance(side: "Side") -> str:
+    return f"If it is to {side.name} (probability {side.probability:.2f})"
+
+
+def _grid(heading: str, one: "TargetMotion | Side") -> "RenderableType":
+    grid = table(heading, "", "estimate", "sd", "50 % region", "90 % region", "99 % region")
+    for words, name, unit in ROWS:
+        quantity = getattr(one, name)
+        regions = [_region(quantity.regions.get(level, ()), unit) for level in ("50", "90", "99")]
+        grid.add_row(words, *_figures(quantity, unit), *regions)
+    return grid
+
+
+def _figures(quantity: "Quantity", unit: str) -> tuple[str, str]:
+    if quantity.estimate is None or quantity.sd is None:
+        return "not known", "–"
+    digits = decimals(quantity.sd)
+    return with_unit(quantity.estimate, digits, unit).lstrip("+"), f"{quantity.sd:,.{digits}f}"
+
+
+def _region(region: "Region", unit: str) -> str:
+    """The intervals of a region: `3,400 to 4,100`, in pieces where it is."""
+    del unit
+    return ", ".join(f"{figure(low, 3)} to {figure(high, 3)}" for low, high in region) or "–"
+
+
+def _known(one: "TargetMotion") -> str:
+    """What is known, in one sentence."""
+    seen = one.observability
+    if one.observable:
+        since = "" if seen.since_s is None else f" since {figure(seen.since_s)} s"
+        return f"Bearings alone tell the range{since}, to ±{figure(seen.range_sd_m, 2)} m (bound)."
+    if not seen.manoeuvred:
+        return "The range cannot be told: own ship has not manoeuvred since the first bearing."
+    if seen.at_best_percent < float("inf"):
+        best = f"{figure(seen.at_best_percent, 2)} %"
+        return f"The range cannot be told yet: own ship's course tells it to ±{best} at best."
+    return "The range cannot be told yet."
+
+
+def _when(one: "TargetMotion") -> "RenderableType":
+    """When the criteria were met."""
+    when, limits = one.convergence, one.criteria
+    asked = (
+        f"range ±{limits.range_percent:g} %, bearing ±{limits.bearing_deg:g}°, course "
+        f"±{limits.course_deg:g}°, speed ±{limits.speed_mps:.2f} m/s, {limits.confidence:.0%} sure"
+    )
+    permitted = (
+        f"the bound permits it from {figure(when.permitted_s)} s"
+        if when.permitted_s is not None
+        else "the bound does not permit it"
+    )
+    if when.sustained_s is None:
+        return text(f"Not converged ({asked}); {permitted}.", "yellow")
+    return text(f"Converged at {figure(when.sustained_s)} s ({asked}); {permitted}.")
+
+
+def _overview(found: "TmaResult") -> "RenderableType":
+    heading = f"{len(found.contacts)} contacts"
+    grid = table(
+        heading, "contact", "bearings", "from", "to", "range", "90 % region", "bearing", "sides"
+    )
+    for one in found.contacts:
+        first, last = one.contact.time_s[0], one.contact.time_s[-1]
+        grid.add_row(
+            one.contact.name,
+            figure(one.bearings),
+            f"{first:,.0f} s",
+            f"{last:,.0f} s",
+            _short(one.range_m, "m"),
+            _region(one.range_m.regions.get("90", ()), "m"),
+            _either(one),
+            _sides(one),
+        )
+    return grid
+
+
+def _short(quantity: "Quantity", unit: str) -> str:
+    if quantity.estimate is None or quantity.sd is None:
+        return "not known"
+    digits = decimals(quantity.sd)
+    return f"{quantity.estimate:,.{digits}f} ± {quantity.sd:,.{digits}f} {unit}"
+
+
+def _either(one: "TargetMotion") -> str:
+    """The bearing, or both of them."""
+    if not one.sides or one.decided:
+        return _short(one.bearing_deg, "°")
+    return " or ".join(figure(side.bearing_deg.estimate, 3) + "°" for side in one.sides)
+
+
+def _sides(one: "TargetMotion") -> str:
+    if not one.sides:
+        return ""
+    return one.sides[0].name if one.decided else "both"
+
+
+def _lasting(seconds: float) -> str:
+    """A duration: `13 min 20 s`."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
