@@ -1,16 +1,16 @@
 """What a batch estimate minimises, recorded once: all plots against one track without noise."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from boresight.filters.fisher import later
 from boresight.filters.formula import Formula
 from boresight.filters.posterior import innovation
 from boresight.lanes import Leaf, Rate, Scalar, Symmetric, Vector
 from boresight.maths import gradient, jacobian, mirror, missing, select
-from boresight.models.components import Component
 from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
 
@@ -145,18 +145,13 @@ def _gather(
     first, elapsed = state["first"], state["elapsed"] + inputs["dt"]
     information, pull, cost = (state[name] for name in Normal._fields)
     for component, measured in zip(sensor.components(motion), inputs["z"], strict=True):
-        predicted, h = gradient(_later(component, motion, elapsed), first)
+        predicted, h = gradient(later(component, motion, elapsed), first)
         there, nu = innovation(component, measured, predicted)
         weight = there / (component.sigma * component.sigma)
         information = information + mirror(np.outer(weight * h, h))
         pull, cost = pull + h * (weight * nu), cost + 0.5 * weight * nu * nu
     kept = {"first": first, "elapsed": elapsed}
     return kept | {"information": information, "gradient": pull, "cost": cost}, {}
-
-
-def _later(component: Component, motion: Motion, elapsed: Any) -> Callable[[Array], Any]:
-    """What a component measures of a track that is given by its first state."""
-    return lambda first: component.value(motion.move(first, elapsed))
 
 
 def _carry(

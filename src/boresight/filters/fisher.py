@@ -10,7 +10,7 @@ All plots must be linearised along one track. At a filter's estimates, each from
 is not told seems to be told a little: a wrong direction of ignorance in every gradient.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ import numpy as np
 from boresight.errors import UsageError
 from boresight.filters.formula import Formula
 from boresight.lanes import Matrix, Rate, Scalar, Symmetric, Vector
-from boresight.maths import gradient, jacobian, mirror
+from boresight.maths import gradient, jacobian, mirror, select
+from boresight.models.components import Component
 from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, with_numbers
 from boresight.models.sensors import Sensor
@@ -93,6 +94,68 @@ def _step(
         weight = there / (component.sigma * component.sigma)
         information = information + mirror(np.outer(weight * h, h))
     return {"information": information}, {"information": information}
+
+
+def information_through(
+    states: Array, at: Array, motion: Motion, sensor: Sensor, dt: Array, heard: Array
+) -> Array:
+    """Information about states at any steps, from all plots up to them, along tracks through them.
+
+    The same as `fisher_information` at those steps, for tracks that need not be the same ones.
+
+    Args:
+        states: (lanes, n), each at a step of its own.
+        at: (lanes,) which step.
+        motion: how targets move; without noise.
+        sensor: what is measured; its numbers fixed, or by step.
+        dt: (1, steps), s before each plot.
+        heard: (steps, k), whether each component was measured.
+
+    Returns:
+        (lanes, n, n).
+
+    Raises:
+        UsageError: the motion has noise, or cannot be run backwards.
+    """
+    states = np.asarray(states, dtype=float)
+    check_reversible(motion, states[0], float(np.max(dt)))
+    lanes, n = states.shape
+    times = np.cumsum(np.ravel(dt))
+    formula = Formula(
+        step=_look_back,
+        motion=motion,
+        sensor=sensor,
+        state=(("information", Symmetric(n)),),
+        inputs=(
+            ("time", Scalar(), Rate.STEP),
+            ("heard", Vector(len(sensor.names)), Rate.STEP),
+            ("now", Scalar(), Rate.LANE),
+            ("state", Vector(n), Rate.LANE),
+        ),
+        outputs=(),
+    )
+    inputs = {"time": times, "heard": heard, "now": times[at], "state": states}
+    start = {"information": np.zeros((lanes, n, n))}
+    steps = int(np.max(at)) + 1
+    return formula.carry(start, inputs, steps)[0]["information"]
+
+
+def _look_back(
+    motion: Motion, sensor: Sensor, state: Mapping[str, Any], inputs: Mapping[str, Any]
+) -> tuple[Any, Any]:
+    """Add what one plot told of the state, unless it is still to come."""
+    ago, information = inputs["time"] - inputs["now"], state["information"]
+    past = select(ago > 0.0, 0.0, 1.0)
+    for component, there in zip(sensor.components(motion), inputs["heard"], strict=True):
+        _, h = gradient(later(component, motion, ago), inputs["state"])
+        weight = past * there / (component.sigma * component.sigma)
+        information = information + mirror(np.outer(weight * h, h))
+    return {"information": information}, {}
+
+
+def later(component: Component, motion: Motion, dt: Any) -> Callable[[Array], Any]:
+    """What a component measures after dt seconds, of the state before them."""
+    return lambda state: component.value(motion.move(state, dt))
 
 
 def check_reversible(motion: Motion, state: Array, dt: float) -> None:
