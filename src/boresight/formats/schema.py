@@ -36,7 +36,16 @@ QUANTITIES: dict[str, Quantity] = {
     "roll": Quantity(_ANGLES, -180.0, 180.0),
     "latitude": Quantity(_ANGLES, -90.0, 90.0),
     "longitude": Quantity(_ANGLES, -180.0, 360.0),
-    "bearing": Quantity(_ANGLES, -360.0, 360.0),
+    "bearing": Quantity(_ANGLES, -720.0, 720.0),
+    "bearing_magnetic": Quantity(_ANGLES, -720.0, 720.0),
+    "bearing_relative": Quantity(_ANGLES, -720.0, 720.0),
+    "tdoa": Quantity(_TIMES, -100.0, 100.0),
+    "course": Quantity(_ANGLES, -720.0, 720.0),
+    "heading": Quantity(_ANGLES, -720.0, 720.0),
+    "axis": Quantity(_ANGLES, -720.0, 720.0),
+    "speed": Quantity(_SPEEDS, 0.0, 1e4),
+    "north": Quantity(_LENGTHS, -1e9, 1e9),
+    "east": Quantity(_LENGTHS, -1e9, 1e9),
     "x": Quantity(_LENGTHS, -1e9, 1e9),
     "y": Quantity(_LENGTHS, -1e9, 1e9),
     "accuracy": Quantity(_LENGTHS, 0.0, 1e9),
@@ -45,6 +54,9 @@ QUANTITIES: dict[str, Quantity] = {
     "sigma_azimuth": Quantity(_ANGLES, 0.0, 360.0),
     "sigma_elevation": Quantity(_ANGLES, 0.0, 360.0),
     "sigma": Quantity(_ANGLES, 0.0, 360.0),
+    "sigma_tdoa": Quantity(_TIMES, 0.0, 100.0),
+    "array_spacing": Quantity(_LENGTHS, 0.0, 1e5),
+    "sound_speed": Quantity(_SPEEDS, 1.0, 1e4),
 }
 OUR_NAMES = {stem: f"{stem}_{next(iter(q.units))}" for stem, q in QUANTITIES.items()}
 
@@ -56,6 +68,7 @@ FLAGS = (
     "test",
     "fixed_transponder",
     "conical",
+    "magnetic",
     "on_ground",
 )
 
@@ -71,8 +84,8 @@ class Kind:
 
 PLOTS = Kind("plots", ("time_s", "range_m", "azimuth_deg"))
 REFERENCE = Kind("reference", ("time_s", "latitude_deg", "longitude_deg"), in_order=False)
-BEARINGS = Kind("bearings", ("time_s", "bearing_deg"))
-OWN_SHIP = Kind("own ship", ("time_s",))
+BEARINGS = Kind("bearings", ("time_s", "bearing_deg"), in_order=False)
+OWN_SHIP = Kind("own ship", ("time_s", "latitude_deg", "longitude_deg"), in_order=False)
 
 
 class Source(NamedTuple):

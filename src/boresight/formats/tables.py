@@ -61,7 +61,20 @@ def read_table(
         DataError: a column is missing, or a value is text, out of range or back in time.
         UsageError: the column map names what is not there.
     """
-    raw, first_line = _load(path)
+    raw, first_line = load(path)
+    return checked(path, raw, first_line, kind, columns=columns, strict=strict)
+
+
+def checked(
+    path: Path,
+    raw: "pl.DataFrame",
+    first_line: int,
+    kind: Kind,
+    *,
+    columns: Mapping[str, str] | None = None,
+    strict: bool = False,
+) -> tuple["pl.DataFrame", int]:
+    """Check a table that is already in memory; `path` names it in errors, see `read_table`."""
     wanted = _check_map(path, raw, dict(columns or {}))
     found = sources(raw.columns, wanted)
     _require(path, raw, kind, found)
@@ -121,8 +134,12 @@ def _scan(rows: "pl.DataFrame") -> float | None:
     return None if value is None else round(float(value), 4)
 
 
-def _load(path: Path) -> tuple["pl.DataFrame", int]:
-    """Return the file's cells (text if CSV) and the line of the first row."""
+def load(path: Path) -> tuple["pl.DataFrame", int]:
+    """Return the file's cells (text if CSV) and the line of the first row.
+
+    Raises:
+        DataError: it is no table.
+    """
     import polars as pl
 
     try:
@@ -198,7 +215,7 @@ def _convert(
             value=False
         )
         if is_text.any():
-            raise _wrong(path, raw, source.theirs, first_line, int(is_text.arg_max() or 0), "text")
+            raise wrong(path, raw, source.theirs, first_line, int(is_text.arg_max() or 0), "text")
     ours = (numbers * source.factor).fill_nan(None).alias(source.ours)
     kept = table.drop(source.theirs) if source.theirs in table.columns else table
     return kept.with_columns(ours)
@@ -218,7 +235,7 @@ def _drop_incomplete(
     if strict and skipped:
         row = int((~whole).arg_max() or 0)
         name = next(name for name in kind.required if table[name][row] is None)
-        raise _wrong(path, table, name, first_line, row, "missing")
+        raise wrong(path, table, name, first_line, row, "missing")
     if skipped == table.height:
         raise DataError(
             f"{path} has no row with {', '.join(kind.required)}",
@@ -259,9 +276,10 @@ def _check_order(path: Path, table: "pl.DataFrame", lines: Any) -> None:
         )
 
 
-def _wrong(
+def wrong(
     path: Path, table: "pl.DataFrame", name: str, first_line: int, row: int, what: str
 ) -> DataError:
+    """Return the error for a cell that is not the number it should be."""
     line = first_line + row
     value = table[name][row]
     return DataError(
