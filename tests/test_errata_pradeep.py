@@ -9,56 +9,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boresight.catalogue import lookup
 from boresight.experiments import scenario
 from boresight.filters import ekf, mgekf
-from boresight.filters.recursion import run_recursion
 from boresight.lanes import Rate, Scalar, Vector, make_kernel, pack_states, trace
 from boresight.lanes.program import Slot
 from boresight.maths import Gaussian, gradient
-from boresight.mixtures.range_parameterised import range_cells
 from boresight.mixtures.weights import weights_over_time
 from boresight.models.motion import ConstantVelocity
-from boresight.models.sensors import Bearings, Pose
+from boresight.models.sensors import Bearings
 from boresight.tma.result import Criteria
+from mixtures.heard import (
+    CELLS,
+    OWN,
+    RELATIVE,
+    SPEED_SD,
+    WIDE,
+    earth_fixed,
+    filtered,
+    relative,
+    start_of,
+)
 from oracles import pradeep as paper
 
 KNOT = 1852.0 / 3600.0
-OWN = paper.own_ship(paper.OWN_SHIP)
-RELATIVE = paper.target(paper.TARGET) - OWN
-SPEED_SD = 11.0
-WIDE = 10_500.0, 5_485.0  # one cell over all ranges from 1 to 20 km
-CELLS = range_cells(1_000.0, 20_000.0, 6)
 OUTPUTS = ("mean", "cov", "innovation", "variance", "loglik")
 HALF_TURN = st.floats(-np.pi, np.pi)
-
-
-def sensor_at(own, azimuth_deg=0.33):
-    """Bearings from places (steps, 2), East and North."""
-    north_east_up = np.column_stack([own[:, 1], own[:, 0], np.zeros(len(own))])
-    return Bearings(azimuth_deg=azimuth_deg, pose=Pose(position_m=north_east_up[None]))
-
-
-def earth_fixed(X, P, own):
-    """The paper's start (lanes, 4) as ours: rows and columns turned round, own ship added."""
-    mean = X[..., paper.OURS] + np.array([own[0, 1], own[0, 0], 0.0, 0.0])
-    return Gaussian(mean, P[..., paper.OURS, :][..., paper.OURS])
-
-
-def relative(mean, own):
-    """Our states (..., steps, 4) as the paper's."""
-    X = mean[..., paper.OURS].copy()
-    X[..., 2:] -= own
-    return X
-
-
-def filtered(name, z, own, start, *, accel=0.0, azimuth_deg=0.33, outputs=("mean",), **settings):
-    """What the package says: z (lanes, steps), a second apart, the first at the start."""
-    motion, sensor = ConstantVelocity(accel_mps2=accel, dims=2), sensor_at(own, azimuth_deg)
-    recursion = lookup(name).with_settings(**settings).recursion(motion, sensor)
-    dt = np.ones((1, z.shape[1]))
-    dt[0, 0] = 0.0
-    return run_recursion(recursion, z[..., None], dt, start, outputs=outputs)
 
 
 def azimuth():
@@ -160,10 +135,6 @@ def test_p5_a_likelihood_of_plain_differences_rules_out_the_right_cell():
     nu, S = 2 * np.pi - 0.001, 2 * paper.SIGMA**2
     assert paper.log_likelihood(paper.wrap(nu), S) > 0.0
     assert paper.log_likelihood(nu, S) < -1e5
-
-
-def start_of(z, middle=WIDE[0], spread=WIDE[1]):
-    return paper.start(z[:, 0], middle, spread, SPEED_SD)
 
 
 def our_gain(X_hat, bearing, gain="exact"):
