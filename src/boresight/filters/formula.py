@@ -57,15 +57,25 @@ class Formula:
     def carry(
         self, start: Mapping[str, Array], inputs: Mapping[str, Array], steps: int
     ) -> tuple[States, dict[str, Array]]:
-        """As `run`, with what travelled from step to step, as it is after the last one."""
+        """As `run`, with what travelled from step to step, as it is after the last one.
+
+        Of numbers that change with the step the first `steps` are used.
+        """
         rated = {n: rate_of(n, value, leaf) for n, (value, leaf) in self.numbers().items()}
         kernel = _kernel(self, tuple((name, rate) for name, (rate, _) in rated.items()))
-        values = {name: value for name, (_, value) in rated.items()} | dict(inputs)
+        values = {n: _first(steps, *pair) for n, pair in rated.items()} | dict(inputs)
         return kernel.run(pack_states(kernel.program.state, start), values, steps)
 
     def numbers(self) -> dict[str, tuple[Any, Leaf]]:
         """Numbers of both models, by name."""
         return numbers(self.motion, "motion") | numbers(self.sensor, "sensor")
+
+
+def _first(steps: int, rate: Rate, value: Array) -> Array:
+    """A number's first steps."""
+    if rate is Rate.STEP:
+        return value[:steps]
+    return value[:, :steps] if rate is Rate.EACH else value
 
 
 @lru_cache(maxsize=64)
