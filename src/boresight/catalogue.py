@@ -11,6 +11,7 @@ from boresight.filters.converted import Converted
 from boresight.filters.error_model import correct
 from boresight.filters.line_of_sight import LineOfSight
 from boresight.filters.method import Filter
+from boresight.filters.modified_polar import ModifiedPolar
 from boresight.filters.range_rate import RangeRate
 from boresight.mixtures.range_parameterised import RangeParameterised
 
@@ -149,6 +150,13 @@ _FILTERS = {
             paper="lineofsight",
             predict=None,
         ),
+        Filter(
+            name="modified-polar",
+            formula=ModifiedPolar,
+            summary="extended Kalman filter in modified polar coordinates, for bearings",
+            paper="aidala1983",
+            predict=None,
+        ),
         *(
             Filter(
                 name=f"rp-{member}",
@@ -158,7 +166,7 @@ _FILTERS = {
                 predict=None,
                 settings=(("member", member),),
             )
-            for member in ("ekf", "mgekf", "ukf", "ckf")
+            for member in ("ekf", "mgekf", "ukf", "ckf", "modified-polar")
         ),
     )
 }

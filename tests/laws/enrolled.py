@@ -186,6 +186,8 @@ FILTERS = (
 )
 CURVED = tuple(entry for entry in FILTERS if entry.curved)
 BY_EAR = (
+    Entry("modified-polar", own_state=True, straight=True),
+    Entry("rp-modified-polar", own_state=True, bank=True, straight=True),
     Entry("rp-ekf", own_state=True, bank=True),
     Entry("rp-ekf", {"cells": 3, "prune": 0.0}, own_state=True, bank=True),
     Entry("rp-mgekf", own_state=True, bank=True),

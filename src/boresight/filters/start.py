@@ -17,6 +17,7 @@ from boresight.models.sensors import Radar, Sensor
 
 Array = Any
 SPEED_MPS = 300.0  # spread of an unknown velocity, each axis: covers airliners
+CONTACT_MPS = 11.0  # that of a contact at sea: 21 knots
 _SPREADS = {  # of further states, by the unit that ends their name
     "mps2": 10.0,  # 1 g
     "radps": 0.1,  # twice the standard rate of turn

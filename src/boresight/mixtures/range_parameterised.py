@@ -17,7 +17,8 @@ import numpy as np
 
 from boresight.errors import UsageError, unknown
 from boresight.filters import ekf, mgekf, sigma
-from boresight.filters.start import on_bearing
+from boresight.filters.modified_polar import ModifiedPolar
+from boresight.filters.start import CONTACT_MPS, on_bearing
 from boresight.filters.steps import Method, State, Surprise, Updating
 from boresight.lanes import Leaf, Vector
 from boresight.maths import Gaussian, mirror, missing, select
@@ -28,7 +29,7 @@ from boresight.models.sensors import Radar, Sensor
 
 Array = Any
 Told = Literal["moments", "best cell"]
-SPEED_MPS = 11.0  # spread of each velocity of a contact at sea: 21 knots
+SPEED_MPS = CONTACT_MPS
 
 _MEMBERS: Mapping[str, Any] = {
     "ekf": lambda: Updating(formula=ekf.update),
@@ -36,6 +37,7 @@ _MEMBERS: Mapping[str, Any] = {
     "mgekf": lambda: Updating(formula=mgekf.update),
     "ukf": sigma.unscented,
     "ckf": sigma.cubature,
+    "modified-polar": ModifiedPolar,
 }
 
 
