@@ -7,7 +7,7 @@ truth of no target. Polar columns everywhere: range (m), bearing, course (degree
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,13 +15,14 @@ from boresight.maths import wrap
 from boresight.mixtures.bank import Bank
 from boresight.tma.contact import Contact
 from boresight.tma.planar import Axes, own_axes, quadrature, spots
-from boresight.tma.regions import angle_regions, radius_regions
+from boresight.tma.regions import angle_regions, normal_ends, radius_regions
 from boresight.tma.result import Quantity, Side
 
 Array = Any
 QUANTITIES = ("range_m", "bearing_deg", "course_deg", "speed_mps")
 NEGLIGIBLE = 1e-6  # of the weight: what a region does not look at
 DECIDED = 0.99  # of the weight on one side of the array
+_DRAWN = 120  # times at which the ends of the region are found
 _SIDES = {-1.0: "port", 1.0: "starboard"}
 
 
@@ -63,20 +64,7 @@ def polar_moments(
         of what is left, wrapped.
     """
     weights = np.asarray(weights, dtype=float)
-    alive = weights > 0.0
-    here = np.broadcast_to(np.asarray(position)[..., None, :], (*alive.shape, 2))[alive]
-    axes = _planes(np.asarray(means)[alive], np.asarray(covs)[alive], here)
-    parts = [np.zeros((*alive.shape, 2)) for _ in range(4)]
-    for part, found in zip(parts, _cell_moments(axes), strict=True):
-        part[alive] = found
-    radius, radius_var, angle, angle_var = parts
-    w = weights[..., None]
-    middle, spread = _mixed(w, radius, radius_var)
-    pull = w * np.exp(-angle_var / 2.0)  # a direction that is not known has no say
-    centre = np.arctan2(np.sum(pull * np.sin(angle), -2), np.sum(pull * np.cos(angle), -2))
-    off, width = _mixed(w, wrap(angle - centre[..., None, :]), angle_var)
-    turned, width = np.degrees(centre + off) % 360.0, np.degrees(width)
-    return _columns(middle, turned), _columns(spread, width)
+    return _mixture(weights, _cell_moments(weights, means, covs, position))
 
 
 def regions(weights: Array, means: Array, covs: Array, position: Array) -> dict[str, Any]:
@@ -143,13 +131,22 @@ def history(bank: Bank, contact: Contact) -> dict[str, Array]:
         bearings).
     """
     weights, probability = _heavier_side(bank)
-    estimate, sd = polar_moments(weights, bank.means, bank.covs, contact.position_m)
-    place = np.sum(weights[..., None] * np.where(weights[..., None] > 0.0, bank.means, 0.0), axis=1)
+    cells = _cell_moments(weights, bank.means, bank.covs, contact.position_m)
+    estimate, sd = _mixture(weights, cells)
+    inside = weights[..., None] > 0.0
+    place = np.sum(weights[..., None] * np.where(inside, bank.means, 0.0), axis=1)
+    low, high = _range_ends(weights, cells, contact.time_s)
+    nu, variance = _forecast(weights, bank)
     found = {name: estimate[:, i] for i, name in enumerate(QUANTITIES)}
     found |= {_sd(name): sd[:, i] for i, name in enumerate(QUANTITIES)}
     return found | {
         "north_m": place[:, 0],
         "east_m": place[:, 1],
+        "range_low_m": low,
+        "range_high_m": high,
+        "innovation_deg": np.degrees(nu),
+        "innovation_sd_deg": np.degrees(np.sqrt(variance)),
+        "nis": nu * nu / variance,
         "side_probability": probability,
     }
 
@@ -161,20 +158,45 @@ def _planes(means: Array, covs: Array, position: Array) -> Axes:
     return own_axes(pairs, blocks)
 
 
-def _cell_moments(axes: Axes) -> tuple[Array, Array, Array, Array]:
-    """Mean and variance of radius and angle of Gaussians; angles about their centre, wrapped."""
+class _Cells(NamedTuple):
+    """Mean and variance of radius and angle, of position and velocity; each (..., cells, 2)."""
+
+    radius: Array
+    radius_var: Array
+    angle: Array
+    angle_var: Array
+
+
+def _cell_moments(weights: Array, means: Array, covs: Array, position: Array) -> _Cells:
+    """Moments of each cell by itself; zeros for cells without weight."""
+    alive = weights > 0.0
+    here = np.broadcast_to(np.asarray(position)[..., None, :], (*alive.shape, 2))[alive]
+    axes = _planes(np.asarray(means)[alive], np.asarray(covs)[alive], here)
     points, w = quadrature()
     radius, angle = spots(axes, points)
-    middle = radius @ w
     centre = axes.turn + np.arctan2(axes.across, axes.along)
     off = wrap(angle - centre[..., None])
-    aside = off @ w
-    return (
+    middle, aside = radius @ w, off @ w
+    found = (
         middle,
         (radius - middle[..., None]) ** 2 @ w,
         centre + aside,
         (off - aside[..., None]) ** 2 @ w,
     )
+    parts = [np.zeros((*alive.shape, 2)) for _ in found]
+    for part, value in zip(parts, found, strict=True):
+        part[alive] = value
+    return _Cells(*parts)
+
+
+def _mixture(weights: Array, cells: _Cells) -> tuple[Array, Array]:
+    """Mean and standard deviation of mixtures, polar columns (..., 4); as in `polar_moments`."""
+    w, angle = weights[..., None], cells.angle
+    middle, spread = _mixed(w, cells.radius, cells.radius_var)
+    pull = w * np.exp(-cells.angle_var / 2.0)  # a direction that is not known has no say
+    centre = np.arctan2(np.sum(pull * np.sin(angle), -2), np.sum(pull * np.cos(angle), -2))
+    off, width = _mixed(w, wrap(angle - centre[..., None, :]), cells.angle_var)
+    return _columns(middle, np.degrees(centre + off) % 360.0), _columns(spread, np.degrees(width))
 
 
 def _mixed(w: Array, means: Array, variances: Array) -> tuple[Array, Array]:
@@ -227,6 +249,31 @@ def _heavier_side(bank: Bank) -> tuple[Array, Array]:
     kept = np.where(bank.side == (1.0 if lean > 0.0 else -1.0), bank.weights, 0.0)
     share = kept.sum(axis=1)
     return kept / share[:, None], share
+
+
+def _range_ends(weights: Array, cells: _Cells, time_s: Array) -> tuple[Array, Array]:
+    """(steps,) ends of the 90 % region of the range, at some times and straight between."""
+    some = np.unique(np.linspace(0, len(time_s) - 1, _DRAWN).astype(int))
+    middle, sd = cells.radius[some, :, 0], np.sqrt(cells.radius_var[some, :, 0])
+    ends = normal_ends(weights[some], middle, sd, 90)
+    low, high = (np.interp(time_s, time_s[some], end) for end in ends)
+    return np.maximum(low, 0.0), high
+
+
+def _forecast(weights: Array, bank: Bank) -> tuple[Array, Array]:
+    """(steps,) innovation, rad, of the forecast by the mixture before each bearing; variance.
+
+    Of a step at which both a bearing and a cone were heard, the bearing's.
+    """
+    before = np.concatenate([weights[:1], weights[:-1]])[..., None]
+    used = (before > 0.0) & np.isfinite(bank.variance)
+    share = np.where(used, before, 0.0)
+    total = share.sum(axis=1)
+    share /= np.where(total > 0.0, total, np.nan)[:, None]
+    nu, sd = _mixed(share, np.where(used, bank.innovation, 0.0), np.where(used, bank.variance, 0.0))
+    first = np.argmax(np.isfinite(nu), axis=-1)[:, None]
+    chosen = (np.take_along_axis(each, first, axis=-1)[:, 0] for each in (nu, sd))
+    return next(chosen), next(chosen) ** 2
 
 
 def _sd(name: str) -> str:

@@ -14,8 +14,9 @@ from boresight.tma.result import LEVELS, Region
 
 Array = Any
 _POINTS = 96  # of each cell, for the grid
+_ALONG = np.linspace(-5.0, 5.0, 31)  # standard deviations, of a normal distribution's grid
 _FINEST = 1e-7  # of the grid's width
-_ROUNDS = 40  # of halving, for a density that parts what is in from what is out
+_ROUNDS = 30  # of halving, for a density that parts what is in from what is out
 
 
 def radius_regions(weights: Array, axes: Axes, levels: Sequence[int] = LEVELS) -> dict[str, Region]:
@@ -53,6 +54,31 @@ def angle_regions(weights: Array, axes: Axes, levels: Sequence[int] = LEVELS) ->
     return _named(levels, [_joined(np.degrees(each)) for each in found])
 
 
+def normal_ends(weights: Array, means: Array, sds: Array, level: int) -> tuple[Array, Array]:
+    """Where the shortest set of each mixture of normal distributions begins and ends.
+
+    Args:
+        weights: (steps, cells); a cell without weight may hold anything.
+        means: (steps, cells).
+        sds: (steps, cells).
+        level: per cent.
+
+    Returns:
+        Two of (steps,).
+    """
+    best = np.argmax(weights, axis=-1)[:, None]
+    means, sds = (  # cells that are gone lie where the best one does
+        np.where(weights > 0.0, each, np.take_along_axis(each, best, axis=-1))
+        for each in (means, sds)
+    )
+    grid = (means[..., None] + sds[..., None] * _ALONG).reshape(len(weights), -1)
+    grid.sort(axis=-1)
+    density = np.zeros_like(grid)
+    for w, mean, sd in zip(weights.T, means.T, sds.T, strict=True):
+        density += (w / sd)[:, None] * np.exp(-0.5 * ((grid - mean[:, None]) / sd[:, None]) ** 2)
+    return outer_ends(grid, density, level)
+
+
 def highest_density(grid: Array, density: Array, levels: Sequence[int]) -> list[Array]:
     """The shortest sets of intervals that hold so much of a density, linear between its points.
 
@@ -68,20 +94,42 @@ def highest_density(grid: Array, density: Array, levels: Sequence[int]) -> list[
     return [_above(grid, density, floor) for floor in floors]
 
 
+def outer_ends(grid: Array, density: Array, level: int) -> tuple[Array, Array]:
+    """Where the shortest set begins and ends, for many densities at once.
+
+    Args:
+        grid: (..., g), not decreasing.
+        density: (..., g).
+        level: per cent.
+
+    Returns:
+        Two of (...).
+    """
+    floor = _floors(grid, density, np.array([level / 100.0]))
+    over = density > floor
+    first = np.argmax(over, axis=-1)
+    last = over.shape[-1] - 1 - np.argmax(over[..., ::-1], axis=-1)
+    low = _crossing(grid, density, floor, first[..., None], -1)
+    high = _crossing(grid, density, floor, last[..., None], 1)
+    return low[..., 0], high[..., 0]
+
+
 def _floors(grid: Array, density: Array, shares: Array) -> Array:
-    """(levels,) the density above which each share lies."""
-    low, high = np.zeros_like(shares), np.full_like(shares, density.max())
-    total = np.sum(np.diff(grid) * (density[:-1] + density[1:])) / 2.0
-    lesser = np.minimum(density[:-1], density[1:])
-    greater = np.maximum(density[:-1], density[1:])
-    slope = np.maximum(greater - lesser, 1e-300)
+    """(..., levels) the density above which each share lies."""
+    high = np.repeat(density.max(axis=-1, keepdims=True), len(shares), axis=-1)
+    low = np.zeros_like(high)
+    width = np.diff(grid)[..., None, :]
+    lesser = np.minimum(density[..., :-1], density[..., 1:])[..., None, :]
+    greater = np.maximum(density[..., :-1], density[..., 1:])[..., None, :]
+    total = np.sum(width * (lesser + greater), axis=-1) / 2.0
+    fall = np.maximum(greater - lesser, 1e-300)
     for _ in range(_ROUNDS):
-        middle = (low + high) / 2.0
-        floor = middle[:, None]
-        part = np.clip((greater - floor) / slope, 0.0, 1.0)
-        held = part * (greater + np.maximum(lesser, floor)) / 2.0 @ np.diff(grid)
+        floor = (low + high) / 2.0
+        level = floor[..., None]
+        part = np.clip((greater - level) / fall, 0.0, 1.0)
+        held = np.sum(width * part * (greater + np.maximum(lesser, level)), axis=-1) / 2.0
         enough = held >= shares * total
-        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
+        low, high = np.where(enough, floor, low), np.where(enough, high, floor)
     return low
 
 
@@ -96,12 +144,14 @@ def _above(grid: Array, density: Array, floor: float) -> Array:
     )
 
 
-def _crossing(grid: Array, density: Array, floor: float, at: Array, side: int) -> Array:
-    """Where the density falls to the floor next to some points; at the grid's end, there."""
-    beyond = np.clip(at + side, 0, len(grid) - 1)
-    fall = density[at] - density[beyond]
-    share = np.where(fall > 0.0, (density[at] - floor) / np.where(fall > 0.0, fall, 1.0), 0.0)
-    return grid[at] + share * (grid[beyond] - grid[at])
+def _crossing(grid: Array, density: Array, floor: Any, at: Array, side: int) -> Array:
+    """Where densities fall to the floor next to some points; at the grid's end, there."""
+    beyond = np.clip(at + side, 0, grid.shape[-1] - 1)
+    here, there = (np.take_along_axis(density, i, axis=-1) for i in (at, beyond))
+    start, end = (np.take_along_axis(grid, i, axis=-1) for i in (at, beyond))
+    fall = here - there
+    share = np.where(fall > 0.0, (here - floor) / np.where(fall > 0.0, fall, 1.0), 0.0)
+    return start + share * (end - start)
 
 
 def _grid(points: Array) -> Array:
