@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boresight.interfaces.report import charts
 from boresight.interfaces.report.charts import Chart
@@ -31,6 +32,7 @@ ESTIMATES = (
     "prior. Shaded: the bearings alone do not tell the range, and no estimate of range, course or "
     "speed is drawn, only what was believed."
 )
+ONE_SIDE = " All of it for a contact to {side}, the likelier side at the end."
 SPREADS = (
     "Standard deviations (logarithmic) against the Cramér-Rao bound, dashed, and against what the "
     "criteria allow, dotted: below it a normal error is small enough with {percent:.3g} %."
@@ -53,7 +55,8 @@ def panels(view: View) -> list[Panel]:
 
 def captions(view: View) -> tuple[str, str]:
     """Say what the two charts show."""
-    return ESTIMATES, SPREADS.format(percent=100 * view.motion.criteria.confidence)
+    one = ONE_SIDE.format(side=view.motion.sides[0].name) if view.motion.sides else ""
+    return ESTIMATES + one, SPREADS.format(percent=100 * view.motion.criteria.confidence)
 
 
 def allowed(view: View, kind: Kind) -> Floats:
@@ -138,10 +141,10 @@ def _estimates(view: View, kind: Kind) -> tuple[list[Chart], Chart]:
     ], _value_axis(kind, low, high, point)
 
 
-def _point(view: View, kind: Kind) -> Floats:
+def _point(view: View, kind: Kind) -> NDArray[np.bool_]:
     """(kept,) whether there is an estimate to be drawn as one."""
     told = view.told | (kind.stem == "bearing")
-    return np.asarray(told & view.sided)
+    return np.asarray(told & (not (view.open_sides and kind.stem == "course")))
 
 
 def _dashed(x: Floats, y: Floats) -> Chart:
@@ -199,7 +202,7 @@ def _spreads(view: View, kind: Kind) -> tuple[list[Chart], Chart]:
         _dashed(view.time, bound),
         line(view.time, limit, charts.GREEN, hoverinfo="skip", line=dotted),
     ]
-    return traces, charts.axis(f"{kind.stem} sd, {kind.unit}", type="log", **_decades(own, limit))
+    return traces, charts.axis(f"{kind.stem} sd, {kind.unit}", type="log") | _decades(own, limit)
 
 
 def _decades(*values: Floats) -> Chart:
@@ -209,4 +212,8 @@ def _decades(*values: Floats) -> Chart:
     if not len(every):
         return {}
     low, high = np.log10(every.min()) - 0.12, np.log10(every.max()) + 0.12
-    return {"range": [float(low), float(high)], "dtick": "D2" if high - low < SHORT else 1}
+    steps = np.log10([1, 2, 5] if high - low < SHORT else [1])
+    ticks = np.add.outer(np.arange(np.floor(low), np.ceil(high)), steps).ravel()
+    ticks = 10 ** ticks[(ticks >= low) & (ticks <= high)]
+    labels = [f"{each:.6g}" for each in ticks]
+    return {"range": [float(low), float(high)], "tickvals": floats(ticks), "ticktext": labels}

@@ -1,9 +1,10 @@
 """The geographic picture of one contact: North up, equal scales, own ship and what it heard."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boresight.interfaces.report import charts
 from boresight.interfaces.report.charts import Chart
@@ -44,17 +45,13 @@ def caption(view: View) -> str:
     """Say what the picture shows of this contact."""
     motion = view.motion
     said = [CAPTION, TOLD if _known(view).any() else ""]
-    said += [BATCH if _has_batch(view) else "", SIDES if _open(view) else ""]
+    said += [BATCH if _has_batch(view) else "", SIDES if view.open_sides else ""]
     return "".join([*said, CELLS if len(motion.cells.range_m) > 1 else ""])
 
 
-def _open(view: View) -> bool:
-    return bool(view.motion.sides) and not view.motion.decided
-
-
-def _known(view: View) -> Floats:
-    """(kept,) 1 where the target's place can be drawn as a point, else 0."""
-    return np.asarray(view.told & view.sided & np.isfinite(view["north_m"]), dtype=float)
+def _known(view: View) -> NDArray[np.bool_]:
+    """(kept,) whether the target's place can be drawn as a point."""
+    return np.asarray(view.told & np.isfinite(view["north_m"]) & (not view.open_sides))
 
 
 def _own(view: View) -> tuple[Floats, Floats]:
@@ -108,7 +105,7 @@ def _reach(view: View) -> float:
     quantities = [view.motion.range_m, *(side.range_m for side in view.motion.sides)]
     ends = [high for each in quantities for _, high in each.regions.get("90", ())]
     ends += [each.estimate + 2 * (each.sd or 0.0) for each in quantities if each.estimate]
-    told = view["range_m"][_known(view) > 0]
+    told = view["range_m"][_known(view)]
     ends += [float(np.nanmax(told))] if len(told) else []
     ends = ends or [float(np.max(view.motion.cells.range_m))]
     return 1.04 * max((end for end in ends if np.isfinite(end)), default=10e3)
@@ -137,7 +134,7 @@ def _cells(view: View) -> Iterator[Chart]:
 def _regions(view: View) -> Iterator[Chart]:
     """Draw the regions of range along the last bearing; of each side while both are possible."""
     motion = view.motion
-    if _open(view):
+    if view.open_sides:
         for side in motion.sides:
             name = f"{side.name}, {100 * side.probability:.0f} %"
             yield from _region(view, side.bearing_deg, side.range_m, SIDE_RGB[side.name], name)
@@ -168,7 +165,7 @@ def _region(
 
 
 def _has_batch(view: View) -> bool:
-    return view.motion.batch is not None and view.motion.observable and not _open(view)
+    return view.motion.batch is not None and view.motion.observable and not view.open_sides
 
 
 def _batch(view: View) -> Iterator[Chart]:
@@ -183,7 +180,7 @@ def _batch(view: View) -> Iterator[Chart]:
 
 
 def _target(view: View) -> Iterator[Chart]:
-    known = _known(view) > 0
+    known = _known(view)
     if not known.any():
         return
     east, north = (np.where(known, view[f"{each}_m"], np.nan) / 1e3 for each in ("east", "north"))
@@ -195,7 +192,7 @@ def _target(view: View) -> Iterator[Chart]:
     yield dots(east[last], north[last], charts.BLUE, size=9) | {"hoverinfo": "skip"}
 
 
-def _ellipses(view: View, known: Any) -> Chart:
+def _ellipses(view: View, known: NDArray[np.bool_]) -> Chart:
     """Draw ellipses of two sd: at the end the whole covariance's, before it along and across."""
     at = np.flatnonzero(known)
     at = at[thinned(len(at), ELLIPSES)]

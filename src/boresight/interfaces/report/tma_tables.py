@@ -20,7 +20,7 @@ def contacts(every: "Sequence[TargetMotion]", linked: Container[int]) -> str:
         every: the contacts.
         linked: places of those that the page shows in detail.
     """
-    heads = ["contact", "bearings", "from, s", "to, s", "range", "range, 90 %", "bearing", "course"]
+    heads = ["contact", "bearings", "heard, s", "range", "range, 90 %", "bearing", "course"]
     heads += ["speed", "side", "good enough since", "what is known"]
     rows = [_contact(each, place, linked) for place, each in enumerate(every)]
     caption = f"{len(every):,} contacts, most bearings first"
@@ -34,10 +34,7 @@ def _contact(motion: "TargetMotion", place: int, linked: Container[int]) -> list
     return [
         Cell(link, motion.contact.name),
         number_cell(motion.bearings),
-        *(
-            Cell(f"{float(each):,.6g}", f"{float(each):.9g}", is_figure=True)
-            for each in _ends(time)
-        ),
+        Cell(f"{time[0]:,.6g} to {time[-1]:,.6g}", f"{time[0]:.9g}", is_figure=True),
         _figure(RANGE, motion.range_m),
         Cell(region(RANGE, motion.range_m) or "–", is_figure=True),
         *(_figure(kind, getattr(motion, kind.name)) for kind in KINDS[1:]),
@@ -50,10 +47,6 @@ def _contact(motion: "TargetMotion", place: int, linked: Container[int]) -> list
 def stem(place: int) -> str:
     """Return what the names of a contact's panels begin with, among several contacts."""
     return f"c{place + 1}-"
-
-
-def _ends(time: "Sequence[float]") -> tuple[float, float]:
-    return time[0], time[-1]
 
 
 def _figure(kind: Kind, found: "Quantity") -> Cell:
@@ -70,10 +63,10 @@ def _side(motion: "TargetMotion") -> str:
 def known(motion: "TargetMotion") -> str:
     """Say in a few words what is known of a contact's range."""
     if motion.observable:
-        return "range, course and speed" if motion.converged_s is not None else "range, roughly"
+        return "range, course, speed" if motion.converged_s is not None else "range, roughly"
     if not motion.observability.manoeuvred:
-        return "bearing alone: own ship did not manoeuvre"
-    return "bearing alone: own ship manoeuvred too little"
+        return "bearing alone: no manoeuvre"
+    return "bearing alone: too little manoeuvre"
 
 
 def quantities(motion: "TargetMotion") -> str:

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from boresight.tma.result import TargetMotion
 
 MOST_STEPS = 900  # of one contact that are drawn; a screen has hardly more columns
-SURE = 0.99  # of a side's weight: `TargetMotion.decided`
 SHADE = "rgba(213,94,0,0.07)"
 
 
@@ -49,14 +48,10 @@ class View:
         """(kept,) whether bearings alone tell the range."""
         return np.asarray(self["observable"] == 1.0)
 
-    @cached_property
-    def sided(self) -> NDArray[np.bool_]:
-        """(kept,) whether the weights have decided for one side, or sides are known."""
-        cells = self.motion.cells
-        if not np.any(cells.side):
-            return np.ones(len(self.kept), dtype=bool)
-        starboard = np.asarray(cells.weights)[self.kept][:, np.asarray(cells.side) > 0].sum(1)
-        return np.asarray(np.abs(starboard - 0.5) >= SURE - 0.5)
+    @property
+    def open_sides(self) -> bool:
+        """Whether either side of the array is still possible."""
+        return bool(self.motion.sides) and not self.motion.decided
 
     @property
     def title(self) -> str:

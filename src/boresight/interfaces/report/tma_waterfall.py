@@ -15,7 +15,7 @@ CAPTION = (
     "Time runs down, bearing across. Dots: bearings as heard, with one sd; line: as estimated; "
     "grey and dashed: own ship's heading."
 )
-CONE = " A cone is heard on either side of the array: hollow dots are the mirror side."
+CONE = " A cone is heard on either side of the array: pale and hollow is the less likely one."
 MOST_DOTS = 12_000  # of all contacts together
 COLORS = (charts.BLUE, charts.ORANGE, charts.GREEN, charts.PURPLE, "#b58900", "#56B4E9", "#3b4a5c")
 
@@ -97,7 +97,7 @@ def _contact(view: View, cut: float, color: str, step: int, *, is_alone: bool) -
             spread = charts.short(sd[::step][known])
             trace["error_x"] = {"array": spread, "color": color, "thickness": 0.6, "width": 0}
         yield trace | {"across": x}
-    estimate = np.where(view.sided, view["bearing_deg"], np.nan)
+    estimate = view["bearing_deg"]
     if np.isfinite(estimate).any():
         ink = charts.INK if is_alone else color
         drawn = _line(estimate, view.time, cut, ink)
