@@ -11,12 +11,12 @@ import pytest
 
 import boresight
 from boresight.errors import UsageError
-from boresight.experiments.consistency import Bias
+from boresight.experiments.consistency import Bias, nearer
 from boresight.experiments.papers import bordonaro_doppler as doppler
 from boresight.experiments.papers import bordonaro_plots as single
 from boresight.experiments.papers.bordonaro_printed import decorrelated, square_error
 from boresight.experiments.papers.bordonaro_study import Study
-from boresight.experiments.papers.bordonaro_words import agree, nearer, somewhere
+from boresight.experiments.papers.bordonaro_words import agree, somewhere
 from boresight.experiments.reproduce import reproduce
 from boresight.experiments.scenario import FOOT_M, lookup, paper
 from boresight.experiments.simulate import simulate

@@ -18,10 +18,11 @@ from boresight.experiments.papers.kashyap_methods import track
 from boresight.experiments.papers.kashyap_runs import Tracked, again, measured
 from boresight.experiments.papers.kashyap_study import Study
 from boresight.experiments.papers.kashyap_tables import COUNT
-from boresight.experiments.papers.kashyap_words import comparable, of_table
+from boresight.experiments.papers.kashyap_words import comparable
 from boresight.experiments.reproduce import reproduce
 from boresight.experiments.scenario import lookup, paper
 from boresight.experiments.simulate import simulate
+from boresight.experiments.verdicts import of_table
 from oracles import kashyap as oracle
 
 ROWS = [

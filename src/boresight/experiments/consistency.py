@@ -151,6 +151,13 @@ def bias(errors: Array) -> Bias:
     return Bias(*(np.where(lost, np.inf, figure)[()] for figure in figures))
 
 
+def nearer(one: Bias, others: list[Bias], goal: float) -> tuple[Array, Array]:
+    """How much farther from a goal an average is than others, (others, ...), and how certain."""
+    value = [np.abs(one.value - goal) - np.abs(other.value - goal) for other in others]
+    error = [np.hypot(one.standard_error, other.standard_error) for other in others]
+    return np.array(value), np.array(error)
+
+
 def line_of_sight_bias(errors: Array, positions: Array) -> ByDirection:
     """Estimation bias along and across the line of sight at every scan.
 

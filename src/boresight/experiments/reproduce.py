@@ -12,7 +12,7 @@ import numpy as np
 from boresight.errors import UsageError
 from boresight.experiments.scenario import paper
 
-_PAPERS = ("aditya", "bordonaro", "kashyap")
+_PAPERS = ("aditya", "bordonaro", "kashyap", "pradeep")
 SEED = 1
 
 

@@ -196,7 +196,7 @@ def _pradeep(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
             azimuth_deg=printed["sigma_bearing_deg"],
             pose=Pose(position_m=_sailed(table, unit * printed["own_speed"], turns=own["turns"])),
         ),
-        initial=np.concatenate([_along(*each) for each in target]),
+        initial=np.concatenate([along(*each) for each in target]),
         prior_cov=np.diag(np.square([(far - near) / 12**0.5] * 2 + [speed_sd] * 2)),
         draw=partial(_between, assumed) if own["anywhere"] else None,
         begin="on bearing",
@@ -220,8 +220,8 @@ def _unit(assumed: dict[str, Any]) -> float:
     return SPEEDS_MPS[assumed["speed_unit"]]
 
 
-def _along(length: Any, direction_deg: Any) -> Array:
-    """North and East of so much in a direction from true North."""
+def along(length: Any, direction_deg: Any) -> Array:
+    """North and East (2, ...) of so much in a direction from true North."""
     angle = np.radians(direction_deg)
     return length * np.array([np.cos(angle), np.sin(angle)])
 
@@ -240,7 +240,7 @@ def _sailed(table: dict[str, Any], speed_mps: float, *, turns: bool) -> Array:
     for start, rate, lasts in zip(*each, strict=True) if turns else ():
         course += rate * np.clip(time_s - start, 0.0, lasts)
     path = np.zeros((1, scans, 3))
-    steps = _along(speed_mps * assumed["dt_s"], course[:-1])
+    steps = along(speed_mps * assumed["dt_s"], course[:-1])
     path[0, 1:, :2] = np.cumsum(steps, axis=1).T
     return path
 
@@ -251,7 +251,7 @@ def _between(assumed: dict[str, Any], normals: Array) -> Array:
 
     edges = np.geomspace(assumed["nearest_m"], assumed["farthest_m"], assumed["cells"] + 1)
     where = np.interp(ndtr(normals[:, 0]), np.linspace(0.0, 1.0, len(edges)), edges)
-    position = _along(where, 360.0 * ndtr(normals[:, 1]))
+    position = along(where, 360.0 * ndtr(normals[:, 1]))
     return np.hstack([position.T, assumed["speed_sd_mps"] * normals[:, 2:]])
 
 

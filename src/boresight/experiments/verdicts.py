@@ -9,6 +9,9 @@
 
 A paper prints one run, or does not say how many; so the band is that of single runs, 5 to 95 %.
 
+A table of many numbers has some outside their bands by chance: how many, our own runs tell. It is
+in band unless fewer of its numbers are inside than of 95 % of our runs.
+
 A claim about averages over many runs is judged point by point (scans, bearings): there it holds or
 fails by three standard errors, those of paired differences where filters saw the same plots, or
 it is undecided. It reproduces if it holds at 95 % of the points or more and fails at none, does not
@@ -17,6 +20,7 @@ which some hold and some do not. Equal averages are told apart once in
 370 points.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -109,6 +113,18 @@ def of_number(published: float, values: Array, *, fitted: bool = False) -> Verdi
         return "does not reproduce"
     near = abs(float(np.median(values)) / published - 1.0) <= _CLOSE
     return "reproduces" if near and not fitted else "in band"
+
+
+def of_table(published: Mapping[str, float], ours: Mapping[str, Array]) -> tuple[str, Verdict]:
+    """How many of a table's numbers are in their bands, which are not, and the verdict."""
+    bands = {name: band_of(ours[name]) for name in published}
+    inside = {name: low <= published[name] <= high for name, (low, high) in bands.items()}
+    each = [(ours[name] >= low) & (ours[name] <= high) for name, (low, high) in bands.items()]
+    needed = int(np.quantile(np.sum(each, axis=0), 0.05, method="lower"))
+    count, outside = sum(inside.values()), [name for name, true in inside.items() if not true]
+    words = f"{count} of {len(inside)} numbers are inside; of our own runs 95 % have at "
+    words += f"least {needed}" + (f"; outside: {', '.join(outside)}" if outside else "")
+    return words, "in band" if count >= needed else "does not reproduce"
 
 
 def of_share(share: float) -> Verdict:

@@ -5,7 +5,7 @@ Claims are made of what its figures show, and of misprints that would decide oth
 
 import numpy as np
 
-from boresight.experiments.consistency import bias
+from boresight.experiments.consistency import bias, nearer
 from boresight.experiments.papers import bordonaro_doppler as doppler
 from boresight.experiments.papers.bordonaro_printed import square_error
 from boresight.experiments.papers.bordonaro_rows_doppler import superior, told
@@ -15,7 +15,6 @@ from boresight.experiments.papers.bordonaro_tracks import OTHERS
 from boresight.experiments.papers.bordonaro_words import (
     agree,
     at_scans,
-    nearer,
     reasons,
     row,
     somewhere,

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from boresight.experiments.consistency import bias
+from boresight.experiments.consistency import bias, nearer
 from boresight.experiments.papers.bordonaro_doppler import STANDARD, RangeRates
 from boresight.experiments.papers.bordonaro_study import Study
-from boresight.experiments.papers.bordonaro_words import nearer, reasons, row
+from boresight.experiments.papers.bordonaro_words import reasons, row
 from boresight.experiments.verdicts import (
     Claim,
     Verdict,

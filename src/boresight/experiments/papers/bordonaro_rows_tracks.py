@@ -4,13 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from boresight.experiments.consistency import Bias, bias
+from boresight.experiments.consistency import Bias, bias, nearer
 from boresight.experiments.papers.bordonaro_study import Study
 from boresight.experiments.papers.bordonaro_tracks import OTHERS, PRINTED, Tracked
 from boresight.experiments.papers.bordonaro_words import (
     agree,
     at_scans,
-    nearer,
     reasons,
     row,
     somewhere,

@@ -42,13 +42,6 @@ def agree(mean: Bias, expected: float) -> bool:
     return not less(-off, mean.standard_error)
 
 
-def nearer(one: Bias, others: list[Bias], goal: float) -> tuple[Array, Array]:
-    """How much farther from a goal an average is than others, (others, ...), and how certain."""
-    value = [np.abs(one.value - goal) - np.abs(other.value - goal) for other in others]
-    error = [np.hypot(one.standard_error, other.standard_error) for other in others]
-    return np.array(value), np.array(error)
-
-
 def reasons(study: Study, *names: str) -> str:
     """Why some assumptions are what they are."""
     return "; ".join(study.table["why"][name] for name in names)

@@ -14,7 +14,6 @@ from boresight.experiments.papers.kashyap_words import (
     by_channel,
     leak,
     numbers,
-    of_table,
     ratios,
     reasons,
     row,
@@ -23,6 +22,7 @@ from boresight.experiments.simulate import simulate
 from boresight.experiments.verdicts import (
     Claim,
     band_of,
+    of_table,
     part,
     said,
     worst,

@@ -2,8 +2,6 @@
 
 The paper prints one run of an unknown truth. Truths differ so much that a fit error alone says
 little (its band is wide); the ratio of two methods on the same truth says more, so both are judged.
-A table of many numbers has some outside their 5 to 95 % bands by chance alone: how many, our own
-runs tell. It is in band unless fewer of its numbers are inside than of 95 % of our runs.
 """
 
 from collections.abc import Mapping
@@ -75,18 +73,6 @@ def ratios(found: Runs, over: str, *methods: str) -> dict[str, Array]:
         for method in methods
         for channel, value in found[method].items()
     }
-
-
-def of_table(published: Mapping[str, float], ours: Mapping[str, Array]) -> tuple[str, Verdict]:
-    """How many of a table's numbers are in their bands, which are not, and the verdict."""
-    bands = {name: band_of(ours[name]) for name in published}
-    inside = {name: low <= published[name] <= high for name, (low, high) in bands.items()}
-    each = [(ours[name] >= low) & (ours[name] <= high) for name, (low, high) in bands.items()]
-    needed = int(np.quantile(np.sum(each, axis=0), 0.05, method="lower"))
-    count, outside = sum(inside.values()), [name for name, true in inside.items() if not true]
-    words = f"{count} of {len(inside)} numbers and ratios are inside; of our own runs 95 % have at "
-    words += f"least {needed}" + (f"; outside: {', '.join(outside)}" if outside else "")
-    return words, "in band" if count >= needed else "does not reproduce"
 
 
 def share(true: Array) -> tuple[float, Verdict]:
