@@ -52,8 +52,8 @@ def particle_filter(
     particles: Array,
     *,
     seed: int,
-    fraction: float = 0.5,
-    bandwidth: float = 0.5,
+    fraction: float = 0.25,
+    bandwidth: float = 0.75,
 ) -> ParticleEstimate:
     """Filter every run with particles of its own.
 

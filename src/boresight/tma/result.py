@@ -112,6 +112,7 @@ class Test:
         p_value: how often chance alone gives as much.
         passed: whether that is at least the false-alarm rate.
         words: one sentence for a reader, with figures.
+        estimate, sd: of what is asked, where that is a size (degrees, seconds); None where not.
     """
 
     name: str
@@ -119,6 +120,8 @@ class Test:
     p_value: float
     passed: bool
     words: str
+    estimate: float | None = None
+    sd: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
