@@ -32,6 +32,7 @@ _TRACKS = ("track", "contact")
 _FLAGS = ("conical", "magnetic")
 _TRUE, _FALSE = ("true", "1", "t", "yes", "y"), ("false", "0", "f", "no", "n", "")
 _FINEST_DEG = 0.03  # no sonar's bearings scatter less
+_FEWEST = 8  # bearings that show how they scatter
 
 
 def read_bearings(
@@ -223,7 +224,8 @@ def _is_in_degrees(raw: "pl.DataFrame", columns: Mapping[str, str], measured: st
 def _check_unit(path: Path, table: "pl.DataFrame", measured: str, remarks: list[str]) -> None:
     """Degrees that all lie within a turn of radians: refuse those that only radians explain."""
     values = table[measured].to_numpy()
-    if np.abs(values).max() > 2 * np.pi or len(values) < 4:
+    is_coarse = np.allclose(10 * values, np.rint(10 * values))  # nobody writes radians so
+    if np.abs(values).max() > 2 * np.pi or len(values) < _FEWEST or is_coarse:
         return
     sd, jumps = _scatter(table, measured)
     reasons = []
