@@ -121,7 +121,7 @@ def batch_map(
     """
     z, starts = np.asarray(z, dtype=float), np.asarray(starts, dtype=float)
     _check(z, sensor, starts)
-    check_reversible(motion, starts[0, 0], float(np.max(dt)))
+    check_reversible(motion, float(np.max(dt)))
     lanes, count, n = starts.shape
     problem = Problem(z, motion, sensor, np.concatenate([[0.0], np.ravel(dt)[1:]]), prior)
     tracks = problem.back(starts.reshape(-1, n))

@@ -61,7 +61,7 @@ def fisher_information(
     """
     states = np.asarray(states, dtype=float)
     lanes, steps, n = states.shape
-    check_reversible(motion, states[0, 0], float(np.max(dt)))
+    check_reversible(motion, float(np.max(dt)))
     formula = Formula(
         step=_step,
         motion=motion,
@@ -119,7 +119,9 @@ def information_through(
         UsageError: the motion has noise, or cannot be run backwards.
     """
     states = np.asarray(states, dtype=float)
-    check_reversible(motion, states[0], float(np.max(dt)))
+    if not len(states):
+        return np.empty((0, *2 * states.shape[1:]))
+    check_reversible(motion, float(np.max(dt)))
     at, (lanes, n) = np.asarray(at), states.shape
     times, heard = np.cumsum(np.ravel(dt)), np.asarray(heard, dtype=float)
     formula = Formula(
@@ -163,13 +165,12 @@ def later(component: Component, motion: Motion, dt: Any) -> Callable[[Array], An
     return lambda state: component.value(motion.move(state, dt))
 
 
-def check_reversible(motion: Motion, state: Array, dt: float) -> None:
+def check_reversible(motion: Motion, dt: float) -> None:
     """Refuse a motion with noise, or one whose step backwards does not undo its step.
 
     Args:
         motion: to be checked.
-        state: (n,) one state.
-        dt: s.
+        dt: s; 0 stands for one second.
 
     Raises:
         UsageError: says which.
@@ -183,6 +184,7 @@ def check_reversible(motion: Motion, state: Array, dt: float) -> None:
             why="noise wears information away, and how much depends on the prior",
             next_step="use ConstantVelocity(accel_mps2=0.0, dims=2)",
         )
+    state = np.arange(1.0, len(motion.names) + 1.0)
     there_and_back = one.move(one.move(state, dt), -dt)
     if not np.allclose(there_and_back, state, rtol=1e-9, atol=1e-9):
         raise UsageError(
@@ -209,7 +211,7 @@ def bound(information: Array) -> Array:
     """
     information = np.asarray(information, dtype=float)
     scale, values, vectors = _scaled(information)
-    told = values > TOLD
+    told = _told(values)
     inverse = np.where(told, 1.0 / np.where(told, values, 1.0), 0.0)
     cov = (
         (vectors * inverse[..., None, :]) @ vectors.mT / (scale[..., :, None] * scale[..., None, :])
@@ -222,7 +224,7 @@ def bound(information: Array) -> Array:
 
 def rank(information: Array) -> Array:
     """How many directions are told: (...,) from (..., n, n)."""
-    return np.sum(_scaled(np.asarray(information, dtype=float))[1] > TOLD, axis=-1)
+    return np.sum(_told(_scaled(np.asarray(information, dtype=float))[1]), axis=-1)
 
 
 def sd_of(information: Array, gradients: Array) -> Array:
@@ -237,7 +239,7 @@ def sd_of(information: Array, gradients: Array) -> Array:
     """
     scale, values, vectors = _scaled(np.asarray(information, dtype=float))
     shares = (np.asarray(gradients) / scale[..., None, :]) @ vectors
-    told = (values > TOLD)[..., None, :]
+    told = _told(values)[..., None, :]
     variance = np.sum(
         np.where(told, shares**2 / np.where(told, values[..., None, :], 1.0), 0.0), -1
     )
@@ -247,9 +249,17 @@ def sd_of(information: Array, gradients: Array) -> Array:
 
 def _scaled(information: Array) -> tuple[Array, Array, Array]:
     """Root of the diagonal, and eigenvalues and eigenvectors of what has ones there instead."""
+    finite = np.isfinite(information).all((-2, -1))[..., None]
     diagonal = np.einsum("...ii->...i", information)
-    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    return scale, *np.linalg.eigh(information / (scale[..., :, None] * scale[..., None, :]))
+    scale = np.sqrt(np.where(finite & (diagonal > 0.0), diagonal, 1.0))
+    even = information / (scale[..., :, None] * scale[..., None, :])
+    values, vectors = np.linalg.eigh(np.where(finite[..., None], even, 0.0))
+    return scale, np.where(finite, values, np.nan), vectors
+
+
+def _told(values: Array) -> Array:
+    """Which eigenvalues are not zero; of what is not a number nothing is said to be untold."""
+    return ~(values <= TOLD)
 
 
 def polar_gradients(states: Array, own_position: Array) -> Array:
