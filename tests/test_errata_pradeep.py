@@ -248,6 +248,28 @@ def test_p7_the_gain_function_enters_the_covariance_only(bearing, turn):
     assert np.linalg.eigvalsh(ours.cov)[0] > 0.0
 
 
+@given(st.integers(0, 2**32), st.floats(-1.0, 1.0))
+def test_no_bearing_makes_the_covariance_grow_unless_it_may(seed, turn):
+    """By the measure of the prior; where g is not let, the update is the extended filter's."""
+    generator = np.random.default_rng(seed)
+    X = np.array([0.0, 0.0, *(generator.uniform(50.0, 9_000.0) * paper.heading(0.3))])
+    A = generator.standard_normal((4, 4)) * [[10.0], [10.0], [1_000.0], [1_000.0]]
+    prior = Gaussian(X[paper.OURS], (A @ A.T)[paper.OURS][:, paper.OURS])
+    z = np.array([0.3 + turn])
+
+    def size(post):
+        return np.trace(np.linalg.solve(prior.cov, post.cov))
+
+    found, let = (
+        mgekf.update(prior, z, [azimuth()]),
+        mgekf.update(prior, z, [azimuth()], may_grow=True),
+    )
+    plain = ekf.update(prior, z, [azimuth()])
+    expected = let if size(let) < 4.0 else plain
+    assert np.array_equal(found.cov, expected.cov)
+    assert size(found) < 4.0 + 1e-6
+
+
 def cells_of(z):
     """Six extended filters a run, as lanes: states, innovations, variances, with a cell's axis."""
     X, P = paper.start(z[:, :1], *CELLS, SPEED_SD)
@@ -339,14 +361,16 @@ def test_p10_x_and_y_are_velocities():
     ("name", "form", "settings"),
     [
         ("ekf", "ekf", {}),
-        ("mgekf", "small angle", {"gain": "small angle"}),
-        ("mgekf", "exact", {"gain": "exact"}),
+        ("mgekf", "small angle", {"gain": "small angle", "may_grow": True}),
+        ("mgekf", "exact", {"gain": "exact", "may_grow": True}),
+        ("mgekf", "exact", {}),
     ],
 )
 def test_a_moving_pose_is_the_papers_relative_state(name, form, settings, accel):
     z = paper.measured(RELATIVE, 4, seed=11)[:, :400]
     own, start = OWN[:400] + np.array([700.0, -300.0]), start_of(z)
-    X, P, nu, S = paper.track(z, own, *start, form, accel=accel)
+    bounded = form != "ekf" and "may_grow" not in settings
+    X, P, nu, S = paper.track(z, own, *start, form, accel=accel, bounded=bounded)
     found = filtered(
         name, z, own, earth_fixed(*start, own), accel=accel, outputs=OUTPUTS, **settings
     )
@@ -374,7 +398,9 @@ def test_a_bank_in_the_papers_relative_state(name, form):
     z = paper.measured(RELATIVE, 3, seed=12)[:, :300]
     own = OWN[:300]
     cells = paper.start(z[:, :1], *CELLS, SPEED_SD)
-    X, P, nu, S = paper.track(np.repeat(z[:, None], 6, axis=1), own, *cells, form)
+    X, P, nu, S = paper.track(
+        np.repeat(z[:, None], 6, axis=1), own, *cells, form, bounded=form != "ekf"
+    )
     share = paper.weights(np.moveaxis(paper.log_likelihood(nu, S), 1, 2))
     mean, cov = paper.mixture(share, np.moveaxis(X, 1, 2), np.moveaxis(P, 1, 2))
     outputs = ("mean", "cov", "kept_log_weights")

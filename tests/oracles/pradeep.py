@@ -101,22 +101,32 @@ def difference(z, X, *, wrapped=True):
     return wrap(nu) if wrapped else nu
 
 
-def update(X, P, z, form, sigma=SIGMA, *, wrapped=True):
+def corrected(P, G, g, sigma):
+    """(ix)."""
+    A = np.eye(4) - outer(G, g)
+    return A @ P @ np.swapaxes(A, -1, -2) + sigma**2 * outer(G, G)
+
+
+def update(X, P, z, form, sigma=SIGMA, *, wrapped=True, bounded=False):
     """(vii) to (ix): H in the gain, g in the covariance; `ekf` has H in both.
+
+    `bounded`, which the paper does not have: H also where g would make the trace of P^-1 P+ more
+    than four.
 
     Returns:
         State, covariance, innovation and its variance.
     """
     H, nu = gradient(X), difference(z, X, wrapped=wrapped)
-    g = H if form == "ekf" else gain(z, X, form)
     S = np.einsum("...i,...ij,...j->...", H, P, H) + sigma**2
     G = np.einsum("...ij,...j->...i", P, H) / S[..., None]
-    A = np.eye(4) - outer(G, g)
-    after = A @ P @ np.swapaxes(A, -1, -2) + sigma**2 * outer(G, G)
+    after = corrected(P, G, H if form == "ekf" else gain(z, X, form), sigma)
+    if bounded:
+        grown = np.trace(np.linalg.solve(P, after), axis1=-2, axis2=-1) > 4.0
+        after = np.where(grown[..., None, None], corrected(P, G, H, sigma), after)
     return X + G * nu[..., None], after, nu, S
 
 
-def track(z, own, X, P, form, *, accel=0.0, sigma=SIGMA, wrapped=True):
+def track(z, own, X, P, form, *, accel=0.0, **settings):
     """One filter: (iii), (vi) to (x), the first bearing at the start.
 
     Args:
@@ -125,6 +135,7 @@ def track(z, own, X, P, form, *, accel=0.0, sigma=SIGMA, wrapped=True):
         X: (..., 4) and P (..., 4, 4) before the first bearing.
         form: `ekf`, or one of `gain`.
         accel: standard deviation of each of the two plant noises.
+        settings: of `update`.
 
     Returns:
         States (..., steps, 4), covariances, innovations and their variances (..., steps).
@@ -135,7 +146,7 @@ def track(z, own, X, P, form, *, accel=0.0, sigma=SIGMA, wrapped=True):
         if k:
             X = X @ phi.T + moved_by(own, k - 1)
             P = phi @ P @ phi.T + accel**2 * gamma @ gamma.T
-        X, P, nu, S = update(X, P, z[..., k], form, sigma, wrapped=wrapped)
+        X, P, nu, S = update(X, P, z[..., k], form, **settings)
         told.append((X, P, nu, S))
     X, P, nu, S = zip(*told, strict=True)
     return np.stack(X, -2), np.stack(P, -3), np.stack(nu, -1), np.stack(S, -1)

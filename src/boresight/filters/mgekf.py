@@ -11,8 +11,12 @@ paper's relative state with its known input b.
 
 With the true bearing B = B^ + d, h(X) - h(X^) = g (X - X^) holds exactly for
 g = d/(R^ sin d) [cos B, -sin B] on (East, North): B is the measured bearing here. Song and Speyer
-have 1/(R^ cos d), which is d/tan d short of it and infinite where d is a quarter of a turn. Beyond
-`widest_deg` the measured bearing says little of the true one, and g is H.
+have 1/(R^ cos d), which is d/tan d short of it and infinite where d is a quarter of a turn.
+
+Nothing there keeps the covariance from growing at every bearing where g and H differ much: a minute
+after a target has passed close by, kilometres are millions of them. So g is H where it would make
+the state less certain than it was (`may_grow` lets it, as the paper does), and beyond `widest_deg`,
+where the measured bearing says little of the true one.
 """
 
 from collections.abc import Sequence
@@ -68,6 +72,7 @@ def update(
     *,
     gain: Gain = "exact",
     widest_deg: float = 60.0,
+    may_grow: bool = False,
 ) -> Posterior:
     """Condition on all components at once; gain with H, covariance with g: (vii) to (ix).
 
@@ -77,6 +82,7 @@ def update(
         components: what the plot measures; those with `legs` have a gain function.
         gain: `exact`, or Song and Speyer's `small angle`.
         widest_deg: innovation beyond which g is H.
+        may_grow: whether g stands where it makes the covariance grow, as in the paper.
     """
     if gain not in get_args(Gain):
         raise UsageError(f"gain={gain!r} is no gain function", next_step=f"use {get_args(Gain)}")
@@ -88,9 +94,18 @@ def update(
         g = H[i]
         if component.legs is not None:
             found, _ = gain_function(component, prior.mean, nu[i], gain=gain)
-            wide = abs(nu[i]) > np.radians(widest_deg)
-            g = select(wide, H[i], found) * seen[i]
+            unfit = abs(nu[i]) > np.radians(widest_deg)
+            if not may_grow:
+                unfit = unfit | _grows(prior.cov, found, H[i], noise[i])
+            g = select(unfit, H[i], found) * seen[i]
         rows.append(g)
     across = H @ prior.cov
     K = solve(across @ H.T + R, across).T
     return post._replace(cov=joseph(prior.cov, K, np.array(rows), R))
+
+
+def _grows(P: Array, g: Array, h: Array, r: Any) -> Any:
+    """Whether (ix), with the gain G of h, makes the trace of P^-1 P+ larger than that of 1."""
+    cross = P @ h
+    level = h @ cross
+    return (g @ P @ g + r) * level > 2.0 * (g @ cross) * (level + r)
