@@ -135,7 +135,7 @@ WRONG = {
     "a negative sigma": ("time_s,bearing_deg,sigma_deg\n0,1,-1\n", "line 2", "-1"),
     "a cone of 200": ("time_s,bearing_deg,conical\n0,200,true\n", "line 2", "180 astern"),
     "a cone of -5": ("time_s,bearing_deg,conical\n0,5,1\n1,-5,1\n", "line 3", "180 astern"),
-    "perhaps a cone": ("time_s,bearing_deg,conical\n0,5,maybe\n", "line 2, column conical", "maybe"),
+    "perhaps a cone": ("time_s,bearing_deg,conical\n0,5,maybe\n", "line 2", "maybe"),
     "a date of two days": ("time,bearing_deg\n03/04/2017 10:00,5\n", "line 2", "two days"),
     "no time at all": ("time,bearing_deg\n12:00:00,5\nnoon,6\n", "line 3, column time", "noon"),
     "a header alone": ("time_s,bearing_deg\n", "0 rows", "no row"),
@@ -205,7 +205,7 @@ def test_degrees_all_round_raise_no_doubt(tmp_path):
     assert read_bearings(csv(tmp_path, many()))[1] == ()
 
 
-def test_frames_are_checked_like_files_and_only_once(tmp_path):
+def test_frames_are_checked_like_files_and_only_once():
     frame = pl.DataFrame({"time_s": [1, 0], "bearing_deg": [20.0, 10.0], "line": ["x", "y"]})
     table, remarks = bearings_table(frame)
     assert table["bearing_deg"].to_list() == [10.0, 20.0]
