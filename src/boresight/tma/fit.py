@@ -66,7 +66,8 @@ def delay_slopes(fit: Fit, contact: Contact, heard: Array) -> Array:
     moved = np.sum(fit.across * contact.velocity_mps[heard], axis=-1)
     if not contact.is_conical:
         return moved
-    axis = np.unwrap(np.nan_to_num(contact.axis_rad))
-    turned = np.gradient(axis, contact.time_s)[heard]
+    known, time = np.isfinite(contact.axis_rad), contact.time_s
+    axis = np.interp(time, time[known], np.unwrap(contact.axis_rad[known]))
+    turned = np.gradient(axis, time)[heard]
     is_cone = ~np.isfinite(contact.bearing_rad[heard])
     return moved + np.where(is_cone, fit.side * turned / fit.sigma, 0.0)

@@ -81,7 +81,7 @@ def noise_level(fit: Fit, false_alarm: float) -> Test:
         passed=p >= false_alarm,
         words=words,
         estimate=ratio * stated,
-        sd=ratio * stated / np.sqrt(2.0 * fit.dof),
+        sd=ratio * stated / float(np.sqrt(2.0 * fit.dof)),
     )
 
 
@@ -180,7 +180,9 @@ def clock(fit: Fit, contact: Contact, heard: Array, false_alarm: float) -> Test:
 def compass(fit: Fit, false_alarm: float) -> Test:
     """Whether all bearings are turned by one angle, as by an error of own ship's compass."""
     fault = _fault(fit, fit.side / fit.sigma)
-    fault = fault._replace(estimate=np.degrees(fault.estimate), sd=np.degrees(fault.sd))
+    fault = fault._replace(
+        estimate=float(np.degrees(fault.estimate)), sd=float(np.degrees(fault.sd))
+    )
     way = "much" if fault.estimate > 0.0 else "little"
     return _told(
         "compass",
