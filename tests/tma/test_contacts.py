@@ -179,7 +179,7 @@ def test_time_differences_are_cones():
 
 
 def test_the_error_at_endfire_is_that_of_arccos():
-    """20,000 draws tell a root mean square to 1 %; that it is one number for a skew law, to 30 %."""
+    """20,000 draws tell a root mean square to 1 %; one number tells a skew law to 30 %."""
     noise = 0.0075
     found, _ = one(differences([1.0] * 20, sigma_tdoa_s=noise * SPACING / SOUND), ship(),
                    array_spacing_m=SPACING)  # fmt: skip
