@@ -12,11 +12,10 @@ import pytest
 from scipy import stats
 
 from boresight.experiments.scenario import lookup
-from boresight.experiments.simulate import simulate
 from boresight.filters.batch import batch_map, velocity_prior
 from boresight.tma.contact import Contact
-from boresight.tma.fit import delay_slopes, fitted
-from boresight.tma.residuals import judge
+from boresight.tma.fit import Fit, delay_slopes, fitted
+from boresight.tma.residuals import judge, whiteness
 
 RUNS, SIGMA = 500, np.radians(0.33)
 NAMES = ["noise level", "whiteness", "outliers", "own ship's clock", "compass", "steady target"]
@@ -192,6 +191,33 @@ def test_single_bearings_that_are_wrong_are_counted_and_named():
     assert failed(tests) == 1.0
     assert all("2 of 801" in each.words for each in tests)
     assert all("100 s" in each.words or "500 s" in each.words for each in tests)
+
+
+def test_correlation_of_neighbours_has_the_moments_of_few_residuals():
+    """Eighteen residuals of a smooth fit of four numbers; 4 standard errors over 4,000 draws."""
+    m, draws = 18, 4000
+    basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, m), 4))[0]
+    normals = np.random.default_rng(11).standard_normal((draws, m))
+    rest = normals - normals @ basis @ basis.T
+    k, ones = np.arange(float(m)), np.ones(m)
+    score = np.array([
+        whiteness(Fit(k, ones, each, basis, np.zeros((m, 2)), ones), 0.01).statistic
+        for each in rest
+    ])  # fmt: skip
+    assert abs(score.mean()) < 4.0 / np.sqrt(draws)
+    assert abs(score.std() - 1.0) < 4.0 / np.sqrt(2 * draws)
+
+
+def test_what_the_track_can_explain_is_no_residual():
+    """A prior holds the best track back: what it left of the bearings is not the noise's."""
+    one, mean = recording(bearings()), np.array([*target([800.0])[0], -7.725, 13.38])
+    assert fitted(one, mean, np.zeros(801)).dof == 797
+    across = fitted(one, mean, np.zeros(801)).across * SIGMA
+    moved = across @ [30.0, -20.0] + (one.time_s - 800.0) * (across @ [0.1, 0.2])
+    noise = SIGMA * np.random.default_rng(12).standard_normal(801)
+    rest = fitted(one, mean, noise + moved).rest
+    assert rest == pytest.approx(fitted(one, mean, noise).rest, abs=1e-9)
+    assert np.abs(moved / SIGMA).max() > 1.0
 
 
 def towed():
