@@ -1,34 +1,38 @@
-"""Extended Kalman filter in modified polar coordinates, for bearings from own ship.
+"""Kalman filter in modified polar coordinates: bearings alone, range apart from what they tell.
 
 [aidala1983] V. J. Aidala and S. E. Hammel, "Utilization of Modified Polar Coordinates for
 Bearings-Only Tracking".
 The state is relative to own ship: rate of bearing, rate of range over range, bearing, and one over
-range. While own ship sails straight on, the first three follow without the fourth: what bearings
-tell before a manoeuvre stays apart from what they cannot tell.
+range. While own ship sails straight on, the first three follow without the fourth, so what bearings
+cannot tell yet does not disturb what they can.
 
-Differs from it: own ship's velocity is its displacement over the interval, since positions are what
-is known; further states of the motion are kept as they are; range and its inverse have the moments
-of lognormal numbers, where a wide start is begun and where it is told.
+Differs from it: the prediction is taken at cubature points, since first order, its own, grows too
+sure of itself (a setting; 300 runs of pradeep's scenario: normalised squared errors of 1.23 at
+800 s, against 1.11); own ship's velocity is its displacement over the interval, since positions are
+what is known; a start is turned into inverse range as if ranges were lognormal, which a wide start
+needs: to first order it would place the target too far away.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from boresight.errors import UsageError
-from boresight.filters import ekf
+from boresight.filters import ekf, sigma
 from boresight.filters.start import CONTACT_MPS, on_bearing
 from boresight.filters.steps import State, Surprise, gaussian_layout
 from boresight.lanes import Leaf, Vector
-from boresight.maths import Gaussian, jacobian, mirror, select, wrap
+from boresight.maths import Gaussian, cholesky, jacobian, mirror, select, wrap
 from boresight.models.components import FORMULAS, Component
-from boresight.models.motion import Motion
+from boresight.models.motion import ConstantVelocity, Motion
 from boresight.models.sensors import Radar, Sensor
 
 Array = Any
+Predicted = Literal["points", "first order"]
 _ANYWHERE = 1_000.0  # m: angles look alike from every range
-_WIDEST = 1.0  # of the squared relative spread of a range
+_NEAR = 1e-12  # least square of what a step leaves of a range
+_WIDEST = 1.0  # greatest squared relative spread of a range that a start may have
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,15 +43,15 @@ class ModifiedPolar:
         range_m, range_sd_m: of the range where it begins on a first bearing, m: those of a uniform
             range from 1 to 20 km.
         nearest_m, farthest_m: an estimate beyond is put there, so that it stays finite and ahead:
-            a target that passes close, or an inverse range that noise has driven below zero.
+            of a target that passes close, or where noise has driven the inverse below zero.
+        predicted: by cubature `points`, or to `first order`, which is the extended Kalman filter.
     """
 
     range_m: float = 10_500.0
     range_sd_m: float = 5_485.0
     nearest_m: float = 10.0
     farthest_m: float = 1e6
-    told: str = "lognormal"
-    begun: str = "lognormal"
+    predicted: Predicted = "points"
 
     def __post_init__(self) -> None:
         """Settings are checked."""
@@ -59,6 +63,10 @@ class ModifiedPolar:
             )
         if not 0.0 < self.range_sd_m < np.inf:
             raise UsageError(f"range_sd_m={self.range_sd_m!r} is not above zero")
+        if self.predicted not in get_args(Predicted):
+            raise UsageError(
+                f"predicted={self.predicted!r} is unknown", next_step=f"use {get_args(Predicted)}"
+            )
 
     @property
     def plain(self) -> bool:
@@ -86,77 +94,69 @@ class ModifiedPolar:
     def layout(self, motion: Motion, sensor: Sensor) -> dict[str, Leaf]:
         """Mean, covariance, and own ship's position and velocity at the last step."""
         del sensor
-        if motion.dims != 2 or len(motion.names) < 4:
+        if not (isinstance(motion, ConstantVelocity) and motion.dims == 2):
             raise UsageError(
-                f"modified polar coordinates of a {type(motion).__name__} in {motion.dims} "
-                "dimensions",
-                why="they are those of positions and velocities in a plane",
-                next_step="use ConstantVelocity(..., dims=2)",
+                f"modified polar coordinates of a {type(motion).__name__}, dims={motion.dims}",
+                why="they are those of straight motion in a plane",
+                next_step="use ConstantVelocity(..., dims=2), or another filter",
             )
         return gaussian_layout(motion) | {"position": Vector(2), "velocity": Vector(2)}
 
     def begin(self, start: Gaussian, motion: Motion, sensor: Sensor) -> State:
-        """Velocities along and across the line of sight, then over the range."""
+        """Velocities along and across the line of sight, and the range, then all over the range."""
         del motion
-        position = _position(sensor)
-        pose = getattr(sensor, "pose", None)
-        velocity = np.zeros(2) if pose is None else pose.velocity_mps[:2]
-        if self.begun == "first":
-            own = np.concatenate([position, velocity])
-            mean, J = jacobian(lambda plane: self._polar(plane, own), start.mean)
-            return self._keep(Gaussian(mean, mirror(J @ start.cov @ J.T)), position, velocity)
-        mean, J = jacobian(lambda s: _sighted(_less(s, position, velocity)), start.mean)
-        kept = _over(Gaussian(mean, J @ start.cov @ J.T))
-        return self._keep(kept, position, velocity)
+        own = _position(sensor), _velocity(sensor)
+        there, J = jacobian(lambda state: _sighted(state - np.concatenate(own)), start.mean)
+        return self._keep(_over(Gaussian(there, J @ start.cov @ J.T)), *own)
 
     def predict(self, state: State, motion: Motion, sensor: Sensor, dt: Any) -> State:
-        """Through the plane, exactly; own ship has moved to where it is now."""
+        """Exactly; what own ship did beside sailing on is divided by the range."""
         before, now = state["position"], _position(sensor)
         still = dt <= 0.0
         velocity = select(still, state["velocity"], (now - before) / select(still, 1.0, dt))
-        own, later = np.concatenate([before, state["velocity"]]), np.concatenate([now, velocity])
+        swerve = before + state["velocity"] * dt - now, state["velocity"] - velocity
 
         def moved(kept: Array) -> Array:
-            return motion.move(self._plane(kept, own), dt)
+            turn, rate, bearing, inverse = kept
+            p, v = (inverse * each for each in _ahead(swerve, bearing))
+            q = np.array([1.0 + rate * dt, turn * dt]) + p
+            return _renewed(q, np.array([rate, turn]) + v, bearing, inverse)
 
-        mean, J = jacobian(lambda kept: self._polar(moved(kept), later), state["mean"])
-        _, G = jacobian(lambda plane: self._polar(plane, later), moved(state["mean"]))
-        cov = J @ state["cov"] @ J.T + G @ motion.noise(dt) @ G.T
-        return self._keep(Gaussian(mean, mirror(cov)), now, velocity)
+        if self.predicted == "points":
+            L, _ = cholesky(state["cov"])
+            mean, D, rest = sigma.regress(moved, np.subtract, state["mean"], L, sigma.CUBATURE)
+            cov = D @ D.T + rest
+        else:
+            mean, J = jacobian(moved, state["mean"])
+            cov = J @ state["cov"] @ J.T
+        G = _pushed(mean)
+        return self._keep(Gaussian(mean, mirror(cov + G @ motion.noise(dt) @ G.T)), now, velocity)
 
     def update(
         self, state: State, z: Array, motion: Motion, sensor: Sensor
     ) -> tuple[State, Surprise]:
         """By an extended Kalman filter, in which a bearing is linear."""
-        own = np.concatenate([state["position"], state["velocity"]])
+        own = state["position"], state["velocity"]
         z, components = sensor.independent(z, motion)
-        seen = [self._seen(component, own) for component in components]
+        seen = [self._seen(component, np.concatenate(own)) for component in components]
         post = ekf.update(Gaussian(state["mean"], state["cov"]), z, seen)
-        kept = self._keep(Gaussian(post.mean, post.cov), state["position"], state["velocity"])
-        return kept, Surprise(*post[2:])
+        return self._keep(Gaussian(post.mean, post.cov), *own), Surprise(*post[2:])
 
     def output(self, state: State, motion: Motion, sensor: Sensor) -> Gaussian:
-        """Moments of position and velocity."""
+        """To first order: no wider than it is, where the range is not known yet.
+
+        Lognormal ranges would be told with twice the error then, and as little certainty.
+        """
         del motion, sensor
         own = np.concatenate([state["position"], state["velocity"]])
-        if self.told == "first":
-            mean, J = jacobian(lambda kept: self._plane(kept, own), state["mean"])
-            return Gaussian(mean, mirror(J @ state["cov"] @ J.T))
-        told = _over(Gaussian(state["mean"], state["cov"]))
-        mean, J = jacobian(lambda s: _shown(s, own), told.mean)
-        return Gaussian(mean, mirror(J @ told.cov @ J.T))
+        mean, J = jacobian(lambda kept: self._plane(kept, own), state["mean"])
+        return Gaussian(mean, mirror(J @ state["cov"] @ J.T))
 
     def _plane(self, kept: Array, own: Array) -> Array:
-        """Position and velocity in the plane, and what follows."""
-        turn, rate, bearing, inverse = kept[:4]
+        """Position and velocity in the plane."""
+        turn, rate, bearing, inverse = kept
         r = 1.0 / self._within(inverse)
-        return _shown(np.array([turn * r, rate * r, bearing, r, *kept[4:]]), own)
-
-    def _polar(self, plane: Array, own: Array) -> Array:
-        """The inverse of `_plane`."""
-        across, along, bearing, r = (s := _sighted(_less(plane, own[:2], own[2:])))[:4]
-        inverse = self._within(1.0 / r)
-        return np.array([across * inverse, along * inverse, bearing, inverse, *s[4:]])
+        return _shown(np.array([turn * r, rate * r, bearing, r])) + own
 
     def _within(self, inverse: Any) -> Any:
         """One over a range that is neither too near nor too far."""
@@ -173,7 +173,7 @@ class ModifiedPolar:
 
         def value(kept: Array) -> Any:
             if component.is_angle:
-                kept = np.array([*kept[:3], 1.0 / _ANYWHERE, *kept[4:]])
+                kept = np.array([0.0, 0.0, kept[2], 1.0 / _ANYWHERE])
             return component.value(self._plane(kept, own))
 
         return Component(component.name, value, component.sigma)
@@ -185,53 +185,71 @@ def _position(sensor: Sensor) -> Array:
     return np.zeros(2) if pose is None else pose.position_m[:2]
 
 
-def _less(state: Array, position: Array, velocity: Array) -> Array:
-    """A state relative to own ship."""
-    return np.concatenate([state[:2] - position, state[2:4] - velocity, state[4:]])
+def _velocity(sensor: Sensor) -> Array:
+    """What own ship's velocity (2,) is said to be."""
+    pose = getattr(sensor, "pose", None)
+    return np.zeros(2) if pose is None else pose.velocity_mps[:2]
+
+
+def _ahead(vectors: tuple[Array, ...], bearing: Any) -> list[Array]:
+    """Vectors (2,) along and across the line of sight."""
+    c, s = np.cos(bearing), np.sin(bearing)
+    return [np.array([c * x + s * y, c * y - s * x]) for x, y in vectors]
+
+
+def _renewed(q: Array, w: Array, bearing: Any, inverse: Any) -> Array:
+    """The state of a target at q that moves with w, along and across a bearing, over a range."""
+    square = q @ q
+    square = select(square < _NEAR, _NEAR, square)
+    turn, rate = (q[0] * w[1] - q[1] * w[0]) / square, (q @ w) / square
+    return np.array([turn, rate, bearing + np.arctan2(q[1], q[0]), inverse / np.sqrt(square)])
+
+
+def _pushed(kept: Array) -> Array:
+    """Jacobian (4, 4) by a push along and across the line of sight, position and velocity."""
+    turn, rate, _, inverse = kept
+    rows = [[-turn, -rate, 0.0, 1.0], [-rate, turn, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0]]
+    return np.array([*rows, [-inverse, 0.0, 0.0, 0.0]]) * inverse
 
 
 def _sighted(relative: Array) -> Array:
-    """Velocities across and along the line of sight, bearing, range, and what follows."""
-    p, v = relative[:2], relative[2:4]
+    """Velocities across and along the line of sight, bearing and range."""
+    p, v = relative[:2], relative[2:]
     r, bearing = FORMULAS["range_m"](p, v), FORMULAS["azimuth_rad"](p, v)
-    c, s = np.cos(bearing), np.sin(bearing)
-    return np.array([c * v[1] - s * v[0], c * v[0] + s * v[1], bearing, r, *relative[4:]])
+    ((along, across),) = _ahead((v,), bearing)
+    return np.array([across, along, bearing, r])
 
 
-def _shown(sighted: Array, own: Array) -> Array:
-    """The inverse of `_sighted`, with own ship added."""
-    across, along, bearing, r = sighted[:4]
+def _shown(sighted: Array) -> Array:
+    """The inverse of `_sighted`."""
+    across, along, bearing, r = sighted
     c, s = np.cos(bearing), np.sin(bearing)
-    relative = [c * r, s * r, c * along - s * across, s * along + c * across]
-    return np.concatenate([np.array(relative) + own, sighted[4:]])
+    return np.array([c * r, s * r, c * along - s * across, s * along + c * across])
 
 
 def _over(state: Gaussian) -> Gaussian:
-    """Moments of (a/x, b/x, c, 1/x, ...) from those of (a, b, c, x, ...): x is lognormal.
+    """Moments of (a/x, b/x, c, 1/x) from those of (a, b, c, x), where x is lognormal.
 
-    The others are Gaussian beside its logarithm; under weights 1/x their means shift by minus their
-    covariance with it.
+    The others are Gaussian beside its logarithm: weights 1/x shift their means by minus their
+    covariance with it. So it is exact but for correlations, which no lognormal may have as large as
+    a Gaussian: they are those with x, times what makes any of them possible.
     """
-    x, q = state.mean[3], state.cov[3, 3] / (state.mean[3] * state.mean[3])
-    q = select(q < _WIDEST, q, _WIDEST)
-    n = len(state.mean)
-    over = np.array([1.0, 1.0, 0.0, 1.0] + [0.0] * (n - 4))
-    mean, cov = np.array(state.mean), np.array(state.cov)
-    # With the logarithm; as correlated as with x, where a lognormal can be.
-    k = cov[3] / (x * np.sqrt(1.0 + 0.5 * q))
-    mean[3], k[3] = 1.0, 0.0 * x
-    cov[3, :], cov[:, 3] = 0.0 * k, 0.0 * k
+    x, spread = state.mean[3], state.cov[3, 3] / (state.mean[3] * state.mean[3])
+    wide = spread > _WIDEST
+    q, fit = select(wide, _WIDEST, spread), _WIDEST / select(wide, spread, _WIDEST)
+    k = state.cov[3] * (np.sqrt(fit / (1.0 + 0.5 * q)) / x)
     y = (1.0 + q) / x
-    a, out = mean - 2.0 * k, np.array(cov)
-    tilted = (1.0 + q) * cov + q * np.outer(a, a) - np.outer(a, k) - np.outer(k, a) - np.outer(k, k)
-    half = cov - np.outer(mean - k, k)
-    for i in range(n):
-        for j in range(n):
-            if over[i] and over[j]:
-                out[i, j] = y * y * tilted[i, j]
-            elif over[i]:
-                out[i, j] = y * half[i, j]
-            elif over[j]:
-                out[i, j] = y * half[j, i]
-    told = np.array([y * (m - s) if o else m for m, s, o in zip(mean, k, over, strict=True)])
-    return Gaussian(told, mirror(out))
+    mean, cov = np.array(state.mean), np.array(state.cov)
+    # x over x is 1, and certain.
+    mean[3], k[3], cov[3, :], cov[:, 3] = 1.0, 0.0, 0.0, 0.0
+    by = np.array([y, y, 1.0, y])
+    a = mean - k
+    told = by * np.array([a[0], a[1], mean[2], 1.0])
+    # Of a pair that is divided twice, of one that is divided once, of one that is not.
+    b = a - k
+    twice = (1.0 + q) * cov + q * np.outer(b, b) - np.outer(b, k) - np.outer(k, b) - np.outer(k, k)
+    once = cov[2] - a * k[2]
+    out = np.array(twice)
+    out[2, :] = out[:, 2] = once
+    out[2, 2] = cov[2, 2]
+    return Gaussian(told, mirror(out * np.outer(by, by)))
