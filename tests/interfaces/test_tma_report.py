@@ -14,7 +14,15 @@ from boresight.interfaces.report import report, tma_picture, tma_residuals, tma_
 from boresight.interfaces.report.tma_history import allowed, marks, panels
 from boresight.interfaces.report.tma_verdict import sentences, summary
 from boresight.interfaces.report.tma_view import View, stretches, thinned, unwrapped
-from boresight.interfaces.report.tma_words import BEARING, COURSE, RANGE, SPEED, estimate, region
+from boresight.interfaces.report.tma_words import (
+    BEARING,
+    COURSE,
+    RANGE,
+    SPEED,
+    estimate,
+    hull,
+    region,
+)
 from boresight.tma.result import Quantity, TmaResult
 
 MEGABYTE = 1_000_000
@@ -152,7 +160,7 @@ def test_a_file_of_contacts_is_summed_up():
     marks_and_words = [(each.mark, each.html) for each in summary(made.many(9))]
     assert marks_and_words[0][0] == "attention"
     assert "3 of 9 contacts can be told" in marks_and_words[0][1]
-    assert "While 6 of the others" in marks_and_words[0][1]
+    assert "while it heard 6 of the others" in marks_and_words[0][1]
     assert "3 contacts both sides" in marks_and_words[2][1]
 
 
@@ -169,6 +177,15 @@ def test_figures_have_the_digits_that_they_are_worth():
     assert region(COURSE, Quantity(estimate=None, sd=None, regions=ninety)) == "355.0 to 004.0°"
     assert region(COURSE, Quantity(estimate=None, sd=None, regions=ninety), "99") == "any course"
     assert region(RANGE, Quantity(estimate=None, sd=None)) == ""
+    assert estimate(RANGE, Quantity(estimate=33.2, sd=0.12)) == "33.20 ± 0.12 m"
+    touching = {"90": ((1_100.0, 7_801.0), (7_802.0, 9_600.0)), "99": ((1.0, 20.0), (500.0, 900.0))}
+    pieces = Quantity(estimate=None, sd=None, regions=touching)
+    assert region(RANGE, pieces) == "1.1 to 9.6 km"
+    assert region(RANGE, pieces, "99") == "1 to 20 m or 500 to 900 m"
+    several = {"90": ((1e3, 2e3), (3e3, 4e3), (5e3, 6e3))}
+    assert hull(RANGE, Quantity(estimate=None, sd=None, regions=several)) == (
+        "1.0 to 6.0 km, in 3 pieces"
+    )
 
 
 def test_stretches_thinning_and_angles():

@@ -5,7 +5,7 @@ import numpy as np
 from boresight.interfaces.report import charts
 from boresight.interfaces.report.residuals import Panel
 from boresight.interfaces.report.tma_history import TALL
-from boresight.interfaces.report.tma_view import View, line, stretches
+from boresight.interfaces.report.tma_view import View, line, stretches, time_axis
 
 CAPTION = (
     "How the weight of one is shared among the bank's cells, by the range from which each began"
@@ -24,7 +24,7 @@ def panels(view: View) -> list[Panel]:
     weights = np.asarray(cells.weights)[view.kept]
     order = sorted(range(len(cells.range_m)), key=lambda i: (cells.side[i], cells.range_m[i]))
     data = [_area(view, cell, weights[:, cell]) for cell in order]
-    x = charts.axis("time, s", showgrid=False, separatethousands=True)
+    x = time_axis(showgrid=False)
     y = charts.axis("weight", range=[0, 1], showgrid=False)
     layout = charts.layout(xaxis=x, yaxis=y, showlegend=True, hovermode="x unified")
     layout["legend"] = {"traceorder": "reversed", "x": 1.01, "y": 1, "font": {"size": 11}}

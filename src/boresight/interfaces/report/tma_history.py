@@ -5,6 +5,7 @@ and against the sd that the criteria allow.
 """
 
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import TypeAlias
 
 import numpy as np
@@ -21,6 +22,7 @@ from boresight.interfaces.report.tma_view import (
     line,
     stretches,
     text,
+    time_axis,
     unwrapped,
 )
 from boresight.interfaces.report.tma_words import KINDS, RANGE, Kind, seconds
@@ -30,8 +32,9 @@ UNTOLD = "range not told by the bearings"
 ESTIMATES = (
     "Estimates with two sd either side; dashed, two sd of the Cramér-Rao bound with the same "
     "prior. Shaded: the bearings alone do not tell the range, and no estimate of range, course or "
-    "speed is drawn, only what was believed."
+    "speed is drawn, only what was believed.{lines}"
 )
+LINES = " Upright lines: when the answer was good enough, and dotted when the bound permits it."
 ONE_SIDE = " All of it for a contact to {side}, the likelier side at the end."
 SPREADS = (
     "Standard deviations (logarithmic) against the Cramér-Rao bound, dashed, and against what the "
@@ -39,7 +42,7 @@ SPREADS = (
 )
 WIDEST_DEG = 180.0
 SHORT = 1.7  # decades
-MARGIN = {"l": 8, "r": 8, "t": 24, "b": 8}  # the words above need room
+MARGIN = {"l": 8, "r": 8, "t": 38, "b": 8}  # two lines of words above need room
 TALL = {"layer": "below", "yref": "paper", "y0": 0, "y1": 1}
 Rows: TypeAlias = Callable[[View, Kind], tuple[list[Chart], Chart]]
 
@@ -56,7 +59,10 @@ def panels(view: View) -> list[Panel]:
 def captions(view: View) -> tuple[str, str]:
     """Say what the two charts show."""
     one = ONE_SIDE.format(side=view.motion.sides[0].name) if view.motion.sides else ""
-    return ESTIMATES + one, SPREADS.format(percent=100 * view.motion.criteria.confidence)
+    lines = LINES if any(asdict(view.motion.convergence).values()) else ""
+    return ESTIMATES.format(lines=lines) + one, SPREADS.format(
+        percent=100 * view.motion.criteria.confidence
+    )
 
 
 def allowed(view: View, kind: Kind) -> Floats:
@@ -85,7 +91,7 @@ def _stacked(view: View, drawn: Rows) -> Chart:
         layout[f"yaxis{mark}"] = axis | {"domain": [max(low, 0.0), 1.0 - row * step]}
         data += [trace | {"yaxis": f"y{mark}"} for trace in traces]
     ends = [float(view.time[0]), float(view.time[-1])]
-    x = charts.axis("time, s", showgrid=False, anchor=f"y{len(KINDS)}", separatethousands=True)
+    x = time_axis(showgrid=False, anchor=f"y{len(KINDS)}")
     layout["xaxis"] = x | ({"range": ends} if ends[1] > ends[0] else {})
     layout["shapes"], layout["annotations"] = marks(view)
     return {"data": data, "layout": layout}
@@ -114,7 +120,8 @@ def marks(view: View) -> tuple[list[Chart], list[Chart]]:
         shapes.append({"type": "line", "line": style, "x0": time_s, "x1": time_s} | TALL)
         if said:
             at = {"xanchor": "left", "yanchor": "bottom", "yref": "paper"}
-            words.append(text(time_s, 1.0, said, **at) | {"font": {"size": 11, "color": color}})
+            font = {"size": 11, "color": color}
+            words.append(text(time_s, 1.0, said, **at, font=font, yshift=14))
     return shapes, words
 
 
@@ -131,7 +138,7 @@ def _estimates(view: View, kind: Kind) -> tuple[list[Chart], Chart]:
         )
         low = np.maximum(low, 0.0)
     point = np.where(shown, middle, np.nan)
-    told = [f"{kind.stem} %{{y:.5~g}} {kind.unit}", "%{x:,.5~g} s<extra></extra>"]
+    told = [f"{kind.stem} %{{y:.5~g}} {kind.unit}", "%{x:,.7~g} s<extra></extra>"]
     drawn = line(view.time, point, charts.BLUE)
     ends = [point - 2 * bound, point + 2 * bound]
     return [
@@ -195,7 +202,7 @@ def _spreads(view: View, kind: Kind) -> tuple[list[Chart], Chart]:
     own, bound = (view[name] * kind.scale for name in (kind.sd, kind.bound))
     limit = allowed(view, kind) * kind.scale
     own, bound, limit = (np.where(each > 0, each, np.nan) for each in (own, bound, limit))
-    hover = {"hovertemplate": f"sd %{{y:.3~g}} {kind.unit}<br>%{{x:,.5~g}} s<extra></extra>"}
+    hover = {"hovertemplate": f"sd %{{y:.3~g}} {kind.unit}<br>%{{x:,.7~g}} s<extra></extra>"}
     dotted = {"color": charts.GREEN, "width": 1.8, "dash": "dot"}
     traces = [
         line(view.time, own, charts.BLUE) | hover,

@@ -17,7 +17,7 @@ from boresight.interfaces.report.sections import Block, Part, Tile, points
 from boresight.interfaces.report.tma_tables import count, stem
 from boresight.interfaces.report.tma_verdict import sentences, summary
 from boresight.interfaces.report.tma_view import View
-from boresight.interfaces.report.tma_words import KINDS, estimate, region
+from boresight.interfaces.report.tma_words import KINDS, estimate, hull
 from boresight.interfaces.report.words import figure, panel
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def _tiles(motion: "TargetMotion") -> tuple[Tile, ...]:
     found = []
     for kind in KINDS:
         quantity = getattr(motion, kind.name)
-        within = region(kind, quantity)
+        within = hull(kind, quantity)
         found.append(Tile(kind.stem, estimate(kind, quantity), f"90 %: {within}" if within else ""))
     return tuple(found)
 

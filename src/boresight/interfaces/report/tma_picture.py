@@ -21,7 +21,7 @@ CAPTION = (
 TOLD = " Blue: the track since the bearings tell the range, with ellipses of two sd."
 BATCH = " Dashed: the straight track that fits all bearings best."
 SIDES = " Both sides of the array are drawn: it hears a cone."
-CELLS = " Rings on the first bearing: the ranges that the bank began with, larger for more weight."
+CELLS = " Rings on the first bearing: where the cells that are left began, larger for more weight."
 LINES, ARROWS, ELLIPSES = 14, 9, 6
 TWO_SD = 2.0
 WIDTHS = {"99": 4, "90": 9, "50": 15}
@@ -32,7 +32,7 @@ WEIGHTLESS = 1e-3  # a cell that holds less is left out
 
 def panel(view: View) -> Panel:
     """Draw the picture of one contact."""
-    data = [*_bearings(view), *_cells(view), *_regions(view), *_batch(view), *_target(view)]
+    data = [*_bearings(view), *_cells(view), *_batch(view), *_target(view), *_regions(view)]
     data += _own_ship(view)
     axes = {"xaxis": charts.axis("East, km")}
     axes |= {"yaxis": charts.axis("North, km", scaleanchor="x")}
@@ -67,7 +67,7 @@ def _own_ship(view: View) -> list[Chart]:
     heading = np.degrees(np.arctan2(velocity[at, 1], velocity[at, 0])) % 360
     arrows = dots(east[at], north[at], charts.INK, symbol="arrow", size=11, angle=floats(heading))
     time = floats(view.time[at])
-    hover = "own ship at %{customdata:,.4~g} s, course %{text}°<extra></extra>"
+    hover = "own ship at %{customdata:,.7~g} s, course %{text}°<extra></extra>"
     arrows |= {"customdata": time, "text": [f"{each:03.0f}" for each in heading]}
     return [track, arrows | {"hovertemplate": hover}]
 
@@ -118,16 +118,17 @@ def _cells(view: View) -> Iterator[Chart]:
     if len(cells.range_m) < 2 or not len(first):
         return
     weight = np.asarray(cells.weights)[-1]
+    weight = np.where(weight > WEIGHTLESS, weight, np.nan)
     side = np.where(np.asarray(cells.side) < 0, len(heard) - 1, 0)
     angle = np.radians(heard[side, first[0]])
     east, north = (each[first[0]] for each in _own(view))
-    away = np.asarray(cells.range_m) / 1e3
+    away = np.where(np.isfinite(weight), cells.range_m, np.nan) / 1e3
     x, y = east + away * np.sin(angle), north + away * np.cos(angle)
     size = 4 + 14 * np.sqrt(np.clip(weight, 0, 1))
     style = {"symbol": "circle-open", "line": {"width": 1.4}}
-    trace = dots(x, y, charts.MUTED, size=floats(size), opacity=0.8, **style)
+    trace = dots(x, y, charts.MUTED, size=floats(np.nan_to_num(size)), opacity=0.8, **style)
     hover = "cell at %{customdata[0]:.2f} km, weight %{customdata[1]:.2g}<extra></extra>"
-    rows = [[round(float(a), 3), float(w)] for a, w in zip(away, weight, strict=True)]
+    rows = list(zip(floats(away), floats(weight), strict=True))
     yield trace | {"customdata": rows, "hovertemplate": hover, "name": "cells' first ranges"}
 
 
@@ -184,12 +185,10 @@ def _target(view: View) -> Iterator[Chart]:
     if not known.any():
         return
     east, north = (np.where(known, view[f"{each}_m"], np.nan) / 1e3 for each in ("east", "north"))
-    hover = "%{customdata:,.5~g} s: %{x:.2f} km E, %{y:.2f} km N<extra></extra>"
+    hover = "%{customdata:,.7~g} s: %{x:.2f} km E, %{y:.2f} km N<extra></extra>"
     trace = line(east, north, charts.BLUE, name="target")
     yield trace | {"customdata": floats(view.time), "hovertemplate": hover}
     yield _ellipses(view, known)
-    last = np.flatnonzero(known)[-1:]
-    yield dots(east[last], north[last], charts.BLUE, size=9) | {"hoverinfo": "skip"}
 
 
 def _ellipses(view: View, known: NDArray[np.bool_]) -> Chart:

@@ -1,14 +1,18 @@
 """What is left of the bearings when the best straight track is taken off, and what it tells."""
 
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boresight.interfaces.report import charts
 from boresight.interfaces.report.calibration_laws import quantile_band
 from boresight.interfaces.report.residuals import Floats, Panel
-from boresight.interfaces.report.tma_view import View, band, dots, line, thinned
+from boresight.interfaces.report.tma_view import View, band, dots, line, thinned, time_axis
 from boresight.interfaces.report.words import Cell, figure, table, text_cell
+
+if TYPE_CHECKING:
+    from boresight.tma.result import Test
 
 MOST_DOTS = 4_000
 WORDS = (
@@ -47,10 +51,10 @@ def _over_time(view: View, deg: Floats, sd: Floats) -> charts.Chart:
     at = thinned(len(deg), MOST_DOTS)
     time, deg, sd = time[at], deg[at], sd[at]
     trace = dots(time, deg, charts.BLUE, size=3.5, opacity=0.7)
-    hover = {"hovertemplate": "%{y:.3f}° at %{x:,.5~g} s<extra></extra>"}
+    hover = {"hovertemplate": "%{y:.3f}° at %{x:,.7~g} s<extra></extra>"}
     reach = 1.1 * max(float(np.nanmax(np.abs(deg))), 2.2 * float(np.median(sd)))
     y = charts.axis("residual, °", range=[-reach, reach], zeroline=True, zerolinecolor="#aab4c0")
-    x = charts.axis("time, s", showgrid=False, separatethousands=True)
+    x = time_axis(showgrid=False)
     data = [*band(time, -2 * sd, 2 * sd, "two sd"), trace | hover]
     return {"data": data, "layout": charts.layout(xaxis=x, yaxis=y)}
 
@@ -87,7 +91,7 @@ def words(view: View) -> str:
             text_cell(test.name),
             Cell(figure(test.statistic, 3), is_figure=True),
             Cell(_chance(test.p_value), is_figure=True),
-            Cell("passed" if test.passed else "<b>failed</b>"),
+            Cell(_finding(test)),
             text_cell(test.words),
         ]
         for test in found.tests
@@ -95,6 +99,17 @@ def words(view: View) -> str:
     return said + (
         table(f"Tests of the residuals of {escape(view.title)}", heads, rows) if rows else ""
     )
+
+
+def asked(test: "Test") -> bool:
+    """Whether the bearings could answer a test at all; one that chance always passes asks none."""
+    return test.p_value < 1.0
+
+
+def _finding(test: "Test") -> str:
+    if not asked(test):
+        return "not asked"
+    return "passed" if test.passed else "<b>failed</b>"
 
 
 def _chance(p_value: float) -> str:

@@ -4,7 +4,18 @@ from collections.abc import Container, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from boresight.interfaces.report.tma_words import KINDS, RANGE, Kind, estimate, knots, region
+from boresight.interfaces.report.tma_words import (
+    BEARING,
+    COURSE,
+    KINDS,
+    RANGE,
+    SPEED,
+    Kind,
+    estimate,
+    hull,
+    knots,
+    region,
+)
 from boresight.interfaces.report.words import Cell, figure, number_cell, table, text_cell
 
 if TYPE_CHECKING:
@@ -21,7 +32,7 @@ def contacts(every: "Sequence[TargetMotion]", linked: Container[int]) -> str:
         linked: places of those that the page shows in detail.
     """
     heads = ["contact", "bearings", "heard, s", "range", "range, 90 %", "bearing", "course"]
-    heads += ["speed", "side", "good enough since", "what is known"]
+    heads += ["speed", "side", "good since", "what is known"]
     rows = [_contact(each, place, linked) for place, each in enumerate(every)]
     caption = f"{len(every):,} contacts, most bearings first"
     return table(caption, heads, rows, name="contacts-table", sortable=True)
@@ -36,8 +47,9 @@ def _contact(motion: "TargetMotion", place: int, linked: Container[int]) -> list
         number_cell(motion.bearings),
         Cell(f"{time[0]:,.6g} to {time[-1]:,.6g}", f"{time[0]:.9g}", is_figure=True),
         _figure(RANGE, motion.range_m),
-        Cell(region(RANGE, motion.range_m) or "–", is_figure=True),
-        *(_figure(kind, getattr(motion, kind.name)) for kind in KINDS[1:]),
+        Cell(hull(RANGE, motion.range_m) or "–", is_figure=True),
+        _bearing(motion),
+        *(_figure(kind, getattr(motion, kind.name)) for kind in (COURSE, SPEED)),
         text_cell(_side(motion)),
         Cell(f"{since:,.6g} s" if since is not None else "–", f"{since or ''}", is_figure=True),
         text_cell(known(motion)),
@@ -54,6 +66,13 @@ def _figure(kind: Kind, found: "Quantity") -> Cell:
     return Cell(estimate(kind, found), key, is_figure=True)
 
 
+def _bearing(motion: "TargetMotion") -> Cell:
+    """The bearing, or those of both sides while both are possible."""
+    if not motion.sides or motion.decided:
+        return _figure(BEARING, motion.bearing_deg)
+    return Cell(" or ".join(estimate(BEARING, side.bearing_deg) for side in motion.sides))
+
+
 def _side(motion: "TargetMotion") -> str:
     if not motion.sides:
         return ""
@@ -65,8 +84,8 @@ def known(motion: "TargetMotion") -> str:
     if motion.observable:
         return "range, course, speed" if motion.converged_s is not None else "range, roughly"
     if not motion.observability.manoeuvred:
-        return "bearing alone: no manoeuvre"
-    return "bearing alone: too little manoeuvre"
+        return "bearing only: no manoeuvre"
+    return "bearing only: too small a manoeuvre"
 
 
 def quantities(motion: "TargetMotion") -> str:
@@ -92,8 +111,13 @@ def _quantity(kind: Kind, found: "Quantity") -> list[Cell]:
     said = estimate(kind, found)
     if kind.unit == "m/s" and found.estimate is not None and found.sd:
         said += f" ({knots(found.estimate, found.sd)})"
-    levels = [Cell(region(kind, found, level) or "–") for level in ("50", "90", "99")]
+    levels = [Cell(_lines(region(kind, found, level))) for level in ("50", "90", "99")]
     return [text_cell(kind.stem), Cell(f"<b>{said}</b>"), *levels]
+
+
+def _lines(words: str) -> str:
+    """Put each piece of a region on a line of its own."""
+    return words.replace(" or ", "<br>or ") or "–"
 
 
 def count(number: int, word: str) -> str:

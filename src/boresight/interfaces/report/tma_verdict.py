@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
 
+from boresight.interfaces.report.tma_residuals import asked
 from boresight.interfaces.report.tma_words import (
     BEARING,
     COURSE,
@@ -12,8 +13,8 @@ from boresight.interfaces.report.tma_words import (
     RANGE,
     SPEED,
     estimate,
+    hull,
     knots,
-    region,
     seconds,
 )
 from boresight.interfaces.report.verdict import Sentence
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from boresight.tma.result import Criteria, TargetMotion, TmaResult
 
 FEW = 10  # bearings
+DOUBT = (
+    "What is said of range, course and speed holds for a steady target on a straight track and for "
+    "the stated noise. These residuals speak against that: take it, and its sd, with reserve."
+)
 APART = 2.0  # sd between the filter's range and the batch estimate's: worth a warning
 
 
@@ -46,7 +51,7 @@ def sentences(motion: "TargetMotion", stem: str = "") -> list[Sentence]:
 
 
 def _range(motion: "TargetMotion") -> Iterator[Sentence]:
-    within = region(RANGE, motion.range_m)
+    within = hull(RANGE, motion.range_m)
     if motion.observable:
         since = seconds(motion.observability.since_s)
         yield Sentence(
@@ -124,7 +129,7 @@ def _motion(motion: "TargetMotion") -> Iterator[Sentence]:
     elif course.regions:
         said.append(
             "Course and speed go with the range and are no better known: with 90 % "
-            f"{region(COURSE, course)}, and {region(SPEED, speed)}."
+            f"{hull(COURSE, course)}, and {hull(SPEED, speed)}."
         )
     if said:
         yield Sentence("note", " ".join(said), "history")
@@ -164,9 +169,10 @@ def criteria(asked: "Criteria") -> str:
 
 
 def _batch(motion: "TargetMotion") -> Iterator[Sentence]:
+    if motion.batch is None and motion.observable:
+        text = "The batch estimate, the filter's reference, did not settle: there is none."
+        yield Sentence("attention", text, "quantities")
     if motion.batch is None:
-        text = "The batch estimate, the reference of the filter, did not settle: there is none."
-        yield Sentence("attention" if motion.observable else "note", text, "quantities")
         return
     here, there = motion.range_m, motion.batch.range_m
     if here.estimate is None or there.estimate is None or not here.sd:
@@ -185,9 +191,11 @@ def _residuals(motion: "TargetMotion") -> Iterator[Sentence]:
     failed = [test for test in motion.residuals.tests if not test.passed]
     for test in failed:
         yield Sentence("attention", escape(test.words), "residuals")
-    if motion.residuals.tests and not failed:
-        count = len(motion.residuals.tests)
-        text = f"The bearing residuals of a straight track pass all {count} tests."
+    if failed:
+        yield Sentence("attention", DOUBT, "residuals")
+    count = sum(map(asked, motion.residuals.tests))
+    if count and not failed:
+        text = f"The residuals of a straight track pass all {count} tests that can be asked."
         yield Sentence("good", text, "residuals")
 
 
@@ -209,8 +217,8 @@ def summary(result: "TmaResult") -> list[Sentence]:
             "good" if told == len(every) else "attention",
             f"<b>The range of {told} of {len(every)} contacts can be told.</b> "
             + (
-                f"While {still} of the others were heard, own ship did not manoeuvre: no "
-                "method could tell their range from bearings alone."
+                f"Own ship did not manoeuvre while it heard {still} of the others: no method "
+                "could tell their range from bearings alone."
                 if still
                 else ""
             ),

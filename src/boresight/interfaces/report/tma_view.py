@@ -104,6 +104,11 @@ def dots(x: Floats, y: Floats, color: str, *, opacity: float = 1.0, **marker: An
     return line(x, y, color, mode="markers") | style
 
 
+def time_axis(**options: Any) -> charts.Chart:
+    """The axis of time: seconds of the file's clock, written out."""
+    return charts.axis("time, s", tickformat=",.7~g") | options
+
+
 def text(x: Any, y: Any, words: str, **options: Any) -> dict[str, Any]:
     """A small note in a chart."""
     style = {"font": {"size": 11, "color": charts.MUTED}, "showarrow": False}

@@ -9,7 +9,7 @@ from boresight.interfaces.report import charts
 from boresight.interfaces.report.charts import Chart
 from boresight.interfaces.report.residuals import Floats, Panel
 from boresight.interfaces.report.tma_picture import sides_heard
-from boresight.interfaces.report.tma_view import View, dots, floats, line
+from boresight.interfaces.report.tma_view import View, dots, floats, line, time_axis
 
 CAPTION = (
     "Time runs down, bearing across. Dots: bearings as heard, with one sd; line: as estimated; "
@@ -28,7 +28,7 @@ def panel(views: Sequence[View], name: str = "waterfall-chart") -> Panel:
     for index, view in enumerate(views):
         data += _contact(view, cut, COLORS[index % len(COLORS)], step, is_alone=len(views) == 1)
     x = charts.axis("bearing, °", side="top", **_ticks(data))
-    y = charts.axis("time, s", autorange="reversed", separatethousands=True)
+    y = time_axis(autorange="reversed")
     layout = charts.layout(xaxis=x, yaxis=y, showlegend=len(views) == 1)
     layout["legend"] = layout["legend"] | {"y": -0.02, "yanchor": "top"}
     for trace in data:
@@ -91,7 +91,7 @@ def _contact(view: View, cut: float, color: str, step: int, *, is_alone: bool) -
         trace = dots(x, time[known], color, size=size, opacity=0.45 if hollow else 0.7, **marks)
         trace |= {
             "name": name,
-            "hovertemplate": f"{name}: %{{x:.1f}}° at %{{y:,.5~g}} s<extra></extra>",
+            "hovertemplate": f"{name}: %{{x:.1f}}° at %{{y:,.7~g}} s<extra></extra>",
         }
         if is_alone:
             spread = charts.short(sd[::step][known])
