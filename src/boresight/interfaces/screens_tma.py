@@ -48,8 +48,10 @@ def _grid(heading: str, one: "TargetMotion | Side") -> "RenderableType":
     grid = table(heading, "", "estimate", "sd", "50 % region", "90 % region", "99 % region")
     for words, name, unit in ROWS:
         quantity = getattr(one, name)
-        regions = [_region(quantity.regions.get(level, ()), unit) for level in ("50", "90", "99")]
+        regions = [_region(quantity, level) for level in ("50", "90", "99")]
         grid.add_row(words, *_figures(quantity, unit), *regions)
+    for column in grid.columns[3:]:
+        column.no_wrap = False  # a region in pieces
     return grid
 
 
@@ -60,10 +62,13 @@ def _figures(quantity: "Quantity", unit: str) -> tuple[str, str]:
     return with_unit(quantity.estimate, digits, unit).lstrip("+"), f"{quantity.sd:,.{digits}f}"
 
 
-def _region(region: "Region", unit: str) -> str:
+def _region(quantity: "Quantity", level: str) -> str:
     """The intervals of a region: `3,400 to 4,100`, in pieces where it is."""
-    del unit
-    return ", ".join(f"{figure(low, 3)} to {figure(high, 3)}" for low, high in region) or "–"
+    pieces = quantity.regions.get(level, ())
+    if not pieces:
+        return "–"
+    digits = decimals(sum(high - low for low, high in pieces) / 8.0)
+    return ", ".join(f"{low:,.{digits}f} to {high:,.{digits}f}" for low, high in pieces)
 
 
 def _known(one: "TargetMotion") -> str:
@@ -88,9 +93,9 @@ def _when(one: "TargetMotion") -> "RenderableType":
         f"±{limits.course_deg:g}°, speed ±{limits.speed_mps:.2f} m/s, {limits.confidence:.0%} sure"
     )
     permitted = (
-        f"the bound permits it from {figure(when.permitted_s)} s"
+        f"the Cramér-Rao bound along this track meets it from {figure(when.permitted_s)} s"
         if when.permitted_s is not None
-        else "the bound does not permit it"
+        else "the Cramér-Rao bound along this track does not meet it"
     )
     if when.sustained_s is None:
         return text(f"Not converged ({asked}); {permitted}.", "yellow")
@@ -100,7 +105,7 @@ def _when(one: "TargetMotion") -> "RenderableType":
 def _overview(found: "TmaResult") -> "RenderableType":
     heading = f"{len(found.contacts)} contacts"
     grid = table(
-        heading, "contact", "bearings", "from", "to", "range", "90 % region", "bearing", "sides"
+        heading, "contact", "bearings", "from", "lasting", "bearing", "range", "90 % region, km"
     )
     for one in found.contacts:
         first, last = one.contact.time_s[0], one.contact.time_s[-1]
@@ -108,13 +113,16 @@ def _overview(found: "TmaResult") -> "RenderableType":
             one.contact.name,
             figure(one.bearings),
             f"{first:,.0f} s",
-            f"{last:,.0f} s",
-            _short(one.range_m, "m"),
-            _region(one.range_m.regions.get("90", ()), "m"),
+            _lasting(last - first),
             _either(one),
-            _sides(one),
+            _short(one.range_m, "m"),
+            _kilometres(one.range_m.regions.get("90", ())),
         )
     return grid
+
+
+def _kilometres(region: "Region") -> str:
+    return ", ".join(f"{low / 1e3:.2f}–{high / 1e3:.2f}" for low, high in region) or "–"
 
 
 def _short(quantity: "Quantity", unit: str) -> str:
@@ -129,12 +137,6 @@ def _either(one: "TargetMotion") -> str:
     if not one.sides or one.decided:
         return _short(one.bearing_deg, "°")
     return " or ".join(figure(side.bearing_deg.estimate, 3) + "°" for side in one.sides)
-
-
-def _sides(one: "TargetMotion") -> str:
-    if not one.sides:
-        return ""
-    return one.sides[0].name if one.decided else "both"
 
 
 def _lasting(seconds: float) -> str:

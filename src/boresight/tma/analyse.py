@@ -121,7 +121,7 @@ def analyse(
         batch=_batch(contact, fit) if fit.converged[0] and seen.observable else None,
         residuals=_judged(contact, fit),
         settings=_settings(chosen, spread, belief),
-        remarks=(),
+        remarks=_doubts(answer.range_m, spread, fit),
     )
 
 
@@ -234,3 +234,19 @@ def _settings(chosen: Filter, spread: RangeParameterised, belief: Belief) -> dic
     own = {k: v for k, v in asdict(spread).items() if k in ("member", "cells", "prune", "told")}
     bank = own if chosen.name in BANKS else {}
     return {"filter": chosen.name, **bank, **limits, "speed_mps": belief.speed_mps}
+
+
+def _doubts(range_m: Quantity, spread: RangeParameterised, fit: BatchEstimate) -> tuple[str, ...]:
+    """What contradicts itself in the answer."""
+    said = []
+    region = range_m.regions.get("90", ())
+    if region and (region[-1][1] < spread.nearest_m or region[0][0] > spread.farthest_m):
+        said.append(
+            f"The range comes out at {region[0][0]:,.0f} to {region[-1][1]:,.0f} m, outside the "
+            f"{spread.nearest_m:,.0f} to {spread.farthest_m:,.0f} m that were believed possible: "
+            "either these limits are wrong, or the contact does not keep its course and speed "
+            "(own ship's own noise, for one, turns with it)."
+        )
+    if not fit.converged[0]:
+        said.append("No steady track fits the bearings well enough for a batch estimate to settle.")
+    return tuple(said)
