@@ -201,6 +201,11 @@ def test_degrees_about_north_are_believed_and_said(tmp_path):
     assert read_bearings(radians)[1] == ()
 
 
+def test_tenths_of_degrees_are_no_radians_however_smooth(tmp_path):
+    rows = "\n".join(f"{t},{0.1 * t:.1f}" for t in range(40))
+    assert read_bearings(csv(tmp_path, f"time_s,bearing_deg\n{rows}\n"))[1] == ()
+
+
 def test_degrees_all_round_raise_no_doubt(tmp_path):
     assert read_bearings(csv(tmp_path, many()))[1] == ()
 
