@@ -21,12 +21,13 @@ import faults
 import faults_calibration
 import faults_filters
 import faults_registration
+import faults_tma
 from faults import Fault
 
 ROOT = Path(__file__).resolve().parents[1]
-_TABLES = (faults, faults_filters, faults_calibration, faults_registration)
+_TABLES = (faults, faults_filters, faults_calibration, faults_registration, faults_tma)
 FAULTS = tuple(fault for table in _TABLES for fault in table.FAULTS)
-_JUDGED = faults_calibration.JUDGES | faults_registration.JUDGES
+_JUDGED = faults_calibration.JUDGES | faults_registration.JUDGES | faults_tma.JUDGES
 
 
 def _tests(*names: str) -> tuple[str, ...]:
@@ -64,15 +65,15 @@ JUDGES = {
     "filters/own_doppler": _tests("statistics/test_own_doppler"),
     "filters/sigma": _tests("laws/test_sigma"),
     "filters/spherical": _tests("laws/test_kept_range", "laws/test_sigma"),
-    "maths/mixing": _tests("laws/test_bent_gaussians", "laws/test_line_of_sight"),
     "filters/line_of_sight": _tests(
         "laws/test_bent_gaussians", "laws/test_line_of_sight", "laws/test_moving_sensor"
     ),
     **{prefix: _tests(*names) for prefix, names in _JUDGED.items()},
     "": LAWS,
 }
-# What is compiled is judged so; of the error model's long recursions that is the quicker way too.
-COMPILED = (KERNELS, JUDGES["filters/error_"])
+# What is compiled is judged so; of long recursions that is the quicker way too.
+_LONG = ("filters/error_", "mixtures/", "filters/mgekf", "filters/fisher", "filters/batch")
+COMPILED = (KERNELS, *(JUDGES[prefix] for prefix in _LONG))
 WANTED = 0.9
 PATIENCE_S = 900
 

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boresight.maths import gradient
+from boresight.maths import gradient, jacobian
 from boresight.maths.angles import wrap
 from boresight.maths.frames import ecef_from_enu, geodetic_from_ecef
 from boresight.models.components import FORMULAS, Component
-from laws.enrolled import BEARING_WORLDS, LINEAR_WORLDS, POLAR_WORLDS, SITE, World
+from boresight.models.sensors import Radar
+from laws.enrolled import BEARING_WORLDS, LINEAR_WORLDS, POLAR_WORLDS, SITE, SPACE, World
 from oracles import filters as textbook
 
 seeds = st.integers(0, 2**32)
@@ -48,6 +49,35 @@ def test_gradients_are_derivatives(world, index, seed):
     mean, _ = world.prior(seed)
     component = world.sensor.components(world.motion)[index]
     check_gradient(component.value, mean, [1.0] * len(mean), angle=component.is_angle)
+
+
+@given(st.lists(st.floats(-9e4, 9e4), min_size=3, max_size=3), st.sampled_from([2, 3]))
+def test_a_cone_is_the_angle_off_the_axis(p, dims):
+    p = np.array(p[:dims]) + [0.0, 1.0, 0.0][:dims]
+    cosine = p[0] / np.linalg.norm(p)
+    assert np.cos(FORMULAS["cone_rad"](p, p)) == pytest.approx(cosine, abs=1e-12)
+    assert 0.0 <= FORMULAS["cone_rad"](p, p) <= np.pi
+
+
+@pytest.mark.parametrize("world", BEARING_WORLDS, ids=str)
+@given(seed=seeds)
+def test_an_angle_in_the_plane_is_that_of_its_legs(world, seed):
+    """Which are linear in the state, on either side of a cone's axis."""
+    mean, _ = world.prior(seed)
+    found = [c for c in world.sensor.components(world.motion) if c.legs is not None]
+    assert [c.name for c in found] == [n for n in world.sensor.names if n.endswith("_rad")]
+    for component in found:
+        x, y = component.legs(mean)
+        assert np.arctan2(y, x) == pytest.approx(component.value(mean), abs=1e-12)
+        _, slopes = jacobian(lambda state, c=component: np.array(c.legs(state)), mean)
+        length = np.hypot(*np.array(slopes)[:, : world.motion.dims])
+        np.testing.assert_allclose(length, 1.0, rtol=1e-12)
+
+
+def test_angles_in_space_have_no_legs_but_the_azimuth():
+    everything = Radar(range_m=1.0, azimuth_deg=1.0, elevation_deg=1.0, cone_deg=1.0)
+    parts = everything.components(SPACE)
+    assert [c.name for c in parts if c.legs is not None] == ["azimuth_rad"]
 
 
 @pytest.mark.parametrize("name", FORMULAS)

@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boresight.errors import UsageError
-from boresight.filters.start import from_polar, one_plot, random_draw, two_plots
+from boresight.filters.start import from_polar, on_bearing, one_plot, random_draw, two_plots
 from boresight.maths import Gaussian
 from boresight.models.coordinates import PositionSensor
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Radar
-from laws.enrolled import MOTIONS, PLANAR, PLANE, POINT, POLAR, POSE, SPACE
+from laws.enrolled import AFLOAT, CONE, HEARD, MOTIONS, PLANAR, PLANE, POINT, POLAR, POSE, SPACE
 from laws.test_components import derivative
 from oracles import filters as textbook
 
@@ -70,6 +70,38 @@ def test_a_start_sees_through_its_sensor_s_pose(seed):
     np.testing.assert_allclose(
         H @ start.cov[0][:3, :3] @ H.T, expected, atol=1e-9 * np.max(expected)
     )
+
+
+@pytest.mark.parametrize("sensor", [HEARD, CONE], ids=["bearing", "cone"])
+@given(seed=seeds)
+def test_a_start_on_a_bearing_lies_on_it(sensor, seed):
+    """Seen from its sensor; the range's spread along the line, the angle's across it."""
+    rng = np.random.default_rng(seed)
+    z = np.array([[rng.uniform(0.1, 3.0)]])
+    start = on_bearing(z, PLANE, sensor, 3e3, 800.0, speed_mps=12.0)
+    component = sensor.components(PLANE)[0]
+    assert component.value(start.mean[0]) == pytest.approx(z[0, 0], abs=1e-12)
+    turn, origin = AFLOAT.rotation[:2, :2], AFLOAT.position_m[:2]
+    away = turn @ (start.mean[0, :2] - origin)
+    np.testing.assert_allclose(away, 3e3 * np.array([np.cos(z[0, 0]), np.sin(z[0, 0])]))
+    along = turn.T @ away / 3e3
+    across = np.array([-along[1], along[0]])
+    expected = 800.0**2 * np.outer(along, along)
+    expected += (3e3 * np.radians(0.8)) ** 2 * np.outer(across, across)
+    np.testing.assert_allclose(start.cov[0, :2, :2], expected, atol=1e-6)
+    np.testing.assert_allclose(start.cov[0, 2:], np.eye(4)[2:] * 144.0)
+    assert not start.mean[0, 2:].any()
+
+
+def test_where_a_bearing_and_a_cone_are_heard_the_bearing_counts():
+    """It has no two sides; where neither was heard there is no start."""
+    both = Radar(azimuth_deg=0.5, cone_deg=2.0)
+    z = np.array([[-0.4, 0.5], [np.nan, 0.5], [np.nan, np.nan]])
+    found = on_bearing(z, PLANE, both, 1e3, 50.0, speed_mps=3.0)
+    np.testing.assert_allclose(found.mean[:2, 1], 1e3 * np.sin([-0.4, 0.5]))
+    spread = [np.linalg.eigvalsh(found.cov[i, :2, :2])[0] ** 0.5 for i in (0, 1)]
+    np.testing.assert_allclose(spread, 1e3 * np.radians([0.5, 2.0]))
+    assert np.all(np.isnan(found.mean[2, :2]))
 
 
 @pytest.mark.parametrize("kind", ["discrete", "continuous"])

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from boresight.errors import UsageError
 from boresight.filters import ekf
 from boresight.filters.recursion import Recursion, run_recursion
-from boresight.filters.start import on_bearing
 from boresight.filters.steps import Updating
 from boresight.lanes import pack_states
 from boresight.maths import Gaussian
@@ -241,20 +240,6 @@ def test_a_cone_keeps_both_sides_until_own_ship_turns(member, side):
     np.testing.assert_allclose(apart.means[:120, 0::2], apart.means[:120, 1::2] * flip, atol=1e-6)
     kept = left if side == "port" else right
     assert kept[-1].sum() > 0.999
-
-
-def test_a_start_on_a_cone_is_to_starboard():
-    """Towards the positive y of its pose; with both an angle and a cone, the angle counts."""
-    sensor, _ = array_of(np.array([[0.0, 0.0], [0.0, 5.0]]))  # course 000
-    found = on_bearing(np.array([[0.4]]), straight(), sensor, 1_000.0, 50.0, speed_mps=3.0)
-    np.testing.assert_allclose(found.mean[0], 1_000.0 * np.array([np.cos(0.4), np.sin(0.4), 0, 0]))
-    both = Radar(azimuth_deg=0.5, cone_deg=2.0)
-    z = np.array([[-0.4, 0.5], [np.nan, 0.5], [np.nan, np.nan]])
-    found = on_bearing(z, straight(), both, 1_000.0, 50.0, speed_mps=3.0)
-    np.testing.assert_allclose(found.mean[:2, 1], 1_000.0 * np.sin([-0.4, 0.5]))
-    spread = [np.linalg.eigvalsh(found.cov[i, :2, :2])[0] ** 0.5 for i in (0, 1)]
-    np.testing.assert_allclose(spread, 1_000.0 * np.radians([0.5, 2.0]))
-    assert np.all(np.isnan(found.mean[2, :2]))
 
 
 def test_a_member_that_is_not_finite_goes_and_the_rest_carry_on():
