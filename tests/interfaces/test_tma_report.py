@@ -151,9 +151,19 @@ def test_what_is_not_known_is_no_number(states, state):
 
 def test_a_batch_estimate_far_off_is_a_warning(states):
     apart = {
-        each.link: each.mark for each in sentences(states["in pieces"]) if "26 sd" in each.html
+        each.link: each.mark for each in sentences(states["in pieces"]) if "26.0 sd" in each.html
     }
     assert apart == {"quantities": "attention"}
+
+
+def test_a_filter_that_is_surer_than_it_can_be_is_told_off(states):
+    motion = states["no turn"]
+    assert "too sure of itself" not in said(motion)
+    sure = motion.history.with_columns(range_sd_m=0.4 * motion.history["range_bound_m"])
+    words = said(replace(motion, history=sure))
+    assert "<b>The filter is too sure of itself:</b>" in words
+    assert "With what was believed before" not in words
+    assert "no better known" not in words
 
 
 def test_a_file_of_contacts_is_summed_up():
@@ -273,7 +283,7 @@ def test_the_waterfall_is_cut_where_nothing_was_heard():
     assert np.nanmax(deg) - np.nanmin(deg) > 300
     chart = tma_waterfall.panel([View(motion)]).chart
     heard = next(each for each in chart["data"] if each["mode"] == "markers")
-    assert np.ptp(unpack(heard["x"])) < 200
+    assert np.nanmax(unpack(heard["x"])) - np.nanmin(unpack(heard["x"])) < 200
     assert chart["layout"]["yaxis"]["autorange"] == "reversed"
     axis = chart["layout"]["xaxis"]
     assert all(0 <= float(word) < 360 for word in axis["ticktext"])

@@ -138,7 +138,7 @@ def _several(result: "TmaResult") -> Drawn:
 def _details(motion: "TargetMotion", place: int, drawn: Drawn) -> str:
     """Fold one contact: its charts are drawn when it is opened."""
     name = stem(place)
-    said = f"{count(motion.bearings, 'bearing')}; known: {tma_tables.known(motion)}"
+    said = f"{count(motion.bearings, 'bearing')}; {tma_tables.known(motion)}"
     places = {each.name for each in drawn.blocks if each.html}
     verdict = f'<div id="{name}verdict">{points(sentences(motion, name), places)}</div>'
     notes = "".join(f"<li>{escape(each)}</li>" for each in _remarks(motion))
@@ -149,7 +149,7 @@ def _details(motion: "TargetMotion", place: int, drawn: Drawn) -> str:
     )
     return (
         f"<details{' open' if place == 0 else ''}><summary>"
-        f"<b>{escape(motion.contact.name)}</b> {escape(said)}</summary>{verdict}"
+        f"<b>Contact {escape(motion.contact.name)}</b>: {escape(said)}</summary>{verdict}"
         f"{f'<ul>{notes}</ul>' if notes else ''}{inside}</details>"
     )
 

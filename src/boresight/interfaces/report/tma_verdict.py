@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
 
+from boresight.interfaces.report.residuals import column
 from boresight.interfaces.report.tma_residuals import asked
 from boresight.interfaces.report.tma_words import (
     BEARING,
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from boresight.tma.result import Criteria, TargetMotion, TmaResult
 
 FEW = 10  # bearings
+TOO_SURE = 0.5  # of the bound: a smaller sd is a fault, not luck
 DOUBT = (
     "What is said of range, course and speed holds for a steady target on a straight track and for "
     "the stated noise. These residuals speak against that: take it, and its sd, with reserve."
@@ -40,6 +42,7 @@ def sentences(motion: "TargetMotion", stem: str = "") -> list[Sentence]:
     """
     parts = (
         _range(motion),
+        _surer(motion),
         _sides(motion),
         _motion(motion),
         _converged(motion),
@@ -62,11 +65,10 @@ def _range(motion: "TargetMotion") -> Iterator[Sentence]:
         )
         return
     believed = f" With what was believed before, it lies within {within} with 90 %."
-    yield Sentence(
-        "attention",
-        f"<b>The range cannot be told yet:</b> {_why(motion)}{believed if within else ''}",
-        "picture",
-    )
+    if not within or _too_sure(motion):
+        believed = ""
+    text = f"<b>The range cannot be told yet:</b> {_why(motion)}{believed}"
+    yield Sentence("attention", text, "picture")
 
 
 def _why(motion: "TargetMotion") -> str:
@@ -87,6 +89,30 @@ def _why(motion: "TargetMotion") -> str:
         f"own ship has manoeuvred, but {left}{best}A longer leg across the line of sight, or a "
         "further turn, would decide it."
     )
+
+
+def _surer(motion: "TargetMotion") -> Iterator[Sentence]:
+    """Warn of a filter that states less than the bearings and the belief can have told it."""
+    if _too_sure(motion):
+        own, bound = _range_sd(motion), _range_bound(motion)
+        text = (
+            f"<b>The filter is too sure of itself:</b> it states the range to an sd of "
+            f"{figure(own, 2)} m, and no method could have it below {figure(bound, 2)} m (the "
+            "Cramér-Rao bound with the same belief). Its regions are too narrow."
+        )
+        yield Sentence("attention", text, "history")
+
+
+def _too_sure(motion: "TargetMotion") -> bool:
+    return _range_sd(motion) < TOO_SURE * _range_bound(motion)
+
+
+def _range_sd(motion: "TargetMotion") -> float:
+    return float(column(motion.history, RANGE.sd)[-1])
+
+
+def _range_bound(motion: "TargetMotion") -> float:
+    return float(column(motion.history, RANGE.bound)[-1])
 
 
 def _sides(motion: "TargetMotion") -> Iterator[Sentence]:
@@ -126,7 +152,7 @@ def _motion(motion: "TargetMotion") -> Iterator[Sentence]:
             f"<b>Course {estimate(COURSE, course)}</b>, <b>speed {estimate(SPEED, speed)}</b> "
             f"({knots(speed.estimate, speed.sd)})."
         )
-    elif course.regions:
+    elif course.regions and not _too_sure(motion):
         said.append(
             "Course and speed go with the range and are no better known: with 90 % "
             f"{hull(COURSE, course)}, and {hull(SPEED, speed)}."
@@ -180,7 +206,7 @@ def _batch(motion: "TargetMotion") -> Iterator[Sentence]:
     apart = abs(here.estimate - there.estimate) / here.sd
     text = (
         f"The batch estimate, the straight track that fits all bearings best, has the range at "
-        f"{estimate(RANGE, there)}: {figure(apart, 2)} sd from the filter's."
+        f"{estimate(RANGE, there)}: {apart:.1f} sd from the filter's."
     )
     yield Sentence("good" if apart < APART else "attention", text, "quantities")
 

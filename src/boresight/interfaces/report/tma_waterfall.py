@@ -1,7 +1,7 @@
 """Bearings against time as sonar operators have them: time downwards, bearing across."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from html import escape
 
 import numpy as np
 
@@ -9,37 +9,58 @@ from boresight.interfaces.report import charts
 from boresight.interfaces.report.charts import Chart
 from boresight.interfaces.report.residuals import Floats, Panel
 from boresight.interfaces.report.tma_picture import sides_heard
-from boresight.interfaces.report.tma_view import View, dots, floats, line, time_axis
+from boresight.interfaces.report.tma_view import (
+    View,
+    dots,
+    floats,
+    line,
+    text,
+    thinned,
+    time_axis,
+)
 
 CAPTION = (
     "Time runs down, bearing across. Dots: bearings as heard, with one sd; line: as estimated; "
     "grey and dashed: own ship's heading."
 )
+CAPTION_MANY = (
+    "Time runs down, bearing across. Dots: bearings as heard; lines: as estimated; grey and "
+    "dashed: own ship's heading. Names are those of the contacts with most bearings."
+)
 CONE = " A cone is heard on either side of the array: pale and hollow is the less likely one."
 MOST_DOTS = 12_000  # of all contacts together
+NAMED = 12  # more names than these hide the picture
+STANDING_MPS = 0.05  # slower, own ship has no heading that its velocity tells
+STEPS_DEG = (1, 2, 5, 10, 15, 30, 45)
 COLORS = (charts.BLUE, charts.ORANGE, charts.GREEN, charts.PURPLE, "#b58900", "#56B4E9", "#3b4a5c")
 
 
 def panel(views: Sequence[View], name: str = "waterfall-chart") -> Panel:
     """Draw the waterfall of one contact or of all."""
-    cut = _cut(views)
-    data = [*_heading(views[0], cut)]
+    cut, is_alone = _cut(views), len(views) == 1
+    time, heading = _heading(views)
+    data = [_line(heading, time, cut, charts.MUTED, "own ship's heading", dash="dash")]
     step = -(-sum(len(view.kept) for view in views) // MOST_DOTS) or 1
-    for index, view in enumerate(views):
-        data += _contact(view, cut, COLORS[index % len(COLORS)], step, is_alone=len(views) == 1)
-    x = charts.axis("bearing, °", side="top", **_ticks(data))
-    y = time_axis(autorange="reversed")
-    layout = charts.layout(xaxis=x, yaxis=y, showlegend=len(views) == 1)
+    for view, color in zip(views, _colors(len(views)), strict=True):
+        data += _alone(view, cut, color) if is_alone else _among(view, cut, color, step)
+    every = [heading, *(view["bearing_deg"] for view in views)]
+    every += [sides_heard(view).ravel() for view in views]
+    x = charts.axis("bearing, °", side="top", **_ticks(_placed(np.concatenate(every), cut)))
+    layout = charts.layout(xaxis=x, yaxis=time_axis(autorange="reversed"), showlegend=is_alone)
     layout["legend"] = layout["legend"] | {"y": -0.02, "yanchor": "top"}
-    for trace in data:
-        trace.pop("across")
-    who = f"contact {views[0].title}" if len(views) == 1 else f"{len(views)} contacts"
+    layout["annotations"] = [] if is_alone else _names(views, cut)
+    who = f"contact {views[0].title}" if is_alone else f"{len(views)} contacts"
     return Panel(name, {"data": data, "layout": layout}, f"bearings of {who} over time")
 
 
 def caption(views: Sequence[View]) -> str:
     """Say what the waterfall shows."""
-    return CAPTION + (CONE if any(view.motion.contact.is_conical for view in views) else "")
+    said = CAPTION if len(views) == 1 else CAPTION_MANY
+    return said + (CONE if any(view.motion.contact.is_conical for view in views) else "")
+
+
+def _colors(count: int) -> list[str]:
+    return [COLORS[index % len(COLORS)] for index in range(count)]
 
 
 def _cut(views: Sequence[View]) -> float:
@@ -57,67 +78,78 @@ def _placed(deg: Floats, cut: float) -> Floats:
     return cut + (deg - cut) % 360
 
 
-def _broken(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Break a line where it leaves on one side and comes back on the other."""
+def _line(deg: Floats, time: Floats, cut: float, color: str, name: str, dash: str) -> Chart:
+    """Draw a line, broken where it leaves on one side and comes back on the other."""
+    x = _placed(deg, cut)
     jump = np.flatnonzero(np.abs(np.diff(x)) > 180) + 1
-    return np.insert(x, jump, np.nan), np.insert(y, jump, np.nan)
+    x, y = np.insert(x, jump, np.nan), np.insert(time, jump, np.nan)
+    style = {"color": color, "width": 1.4, "dash": dash}
+    return line(x, y, color, name=name, line=style, hoverinfo="skip")
 
 
-def _line(deg: Floats, time: Floats, cut: float, color: str, **style: Any) -> Chart:
-    x, y = _broken(_placed(deg, cut), time)
-    trace = line(x, y, color, showlegend=False)
-    return trace | {"line": {"color": color, "width": 1.5} | style, "across": x}
+def _heading(views: Sequence[View]) -> tuple[Floats, Floats]:
+    """Return times and own ship's course, degrees, over all that was heard; NaN where it stood."""
+    contacts = [view.motion.contact for view in views]
+    time = np.concatenate([each.time_s for each in contacts])
+    north, east = np.concatenate([each.velocity_mps for each in contacts]).T
+    time, first = np.unique(time, return_index=True)
+    kept = thinned(len(time))
+    north, east = north[first][kept], east[first][kept]
+    course = np.degrees(np.arctan2(east, north))
+    return time[kept], np.where(np.hypot(north, east) > STANDING_MPS, course, np.nan)
 
 
-def _heading(view: View, cut: float) -> Iterator[Chart]:
-    velocity = np.asarray(view.motion.contact.velocity_mps)[view.kept]
-    moving = np.hypot(*velocity.T) > 0.05
-    course = np.where(moving, np.degrees(np.arctan2(velocity[:, 1], velocity[:, 0])), np.nan)
-    if np.isfinite(course).any():
-        drawn = _line(course, view.time, cut, charts.MUTED, dash="dash", width=1.2)
-        yield drawn | {"name": "own ship's heading", "showlegend": True, "hoverinfo": "skip"}
+def _alone(view: View, cut: float, color: str) -> Iterator[Chart]:
+    """Draw one contact: dots with their sd, and the estimate."""
+    sd = charts.short(np.degrees(view.motion.contact.sigma_rad)[view.kept])
+    bars = {"error_x": {"array": sd, "color": color, "thickness": 0.6, "width": 0}}
+    yield from (trace | bars for trace in _heard(view, cut, color, 4.0, 1))
+    yield _line(view["bearing_deg"], view.time, cut, charts.INK, "estimate", "solid")
 
 
-def _contact(view: View, cut: float, color: str, step: int, *, is_alone: bool) -> Iterator[Chart]:
-    heard, sd = sides_heard(view), np.degrees(view.motion.contact.sigma_rad)[view.kept]
-    time, name = view.time[::step], view.title
-    mirror = _mirror(view)
-    for side, deg in enumerate(heard):
-        known = np.isfinite(deg[::step])
-        x = _placed(deg[::step][known], cut)
-        hollow = len(heard) > 1 and side == mirror
-        marks = {"symbol": "circle-open"} if hollow else {}
-        size = 4 if is_alone else 2.5
-        trace = dots(x, time[known], color, size=size, opacity=0.45 if hollow else 0.7, **marks)
-        trace |= {
-            "name": name,
-            "hovertemplate": f"{name}: %{{x:.1f}}° at %{{y:,.7~g}} s<extra></extra>",
-        }
-        if is_alone:
-            spread = charts.short(sd[::step][known])
-            trace["error_x"] = {"array": spread, "color": color, "thickness": 0.6, "width": 0}
-        yield trace | {"across": x}
-    estimate = view["bearing_deg"]
-    if np.isfinite(estimate).any():
-        ink = charts.INK if is_alone else color
-        drawn = _line(estimate, view.time, cut, ink)
-        yield drawn | {"name": "estimate", "showlegend": is_alone, "hoverinfo": "skip"}
+def _among(view: View, cut: float, color: str, step: int) -> Iterator[Chart]:
+    """Draw one contact of many."""
+    yield from _heard(view, cut, color, 2.5, step)
+    yield _line(view["bearing_deg"], view.time, cut, color, "estimate", "solid")
 
 
-def _mirror(view: View) -> int:
-    """Return which side of a cone is the less likely: 0 starboard, 1 port."""
-    first = view.motion.sides[0].name if view.motion.sides else "starboard"
-    return 1 if first == "starboard" else 0
+def _heard(view: View, cut: float, color: str, size: float, step: int) -> Iterator[Chart]:
+    """Draw what was heard; of a cone both sides, the less likely one pale."""
+    name = escape(view.title)
+    hover = f"{name}: %{{x:.1f}}° at %{{y:,.7~g}} s<extra></extra>"
+    pale = {"symbol": "circle-open", "opacity": 0.45}
+    for side, deg in enumerate(sides_heard(view)):
+        style = {"opacity": 0.7} if side == _likely(view) else pale
+        x = _placed(deg[::step], cut)
+        trace = dots(x, view.time[::step], color, size=size, **style)
+        yield trace | {"name": name, "hovertemplate": hover}
 
 
-def _ticks(data: Sequence[Chart]) -> Chart:
+def _likely(view: View) -> int:
+    """Return which side of a cone is the likelier: 0 starboard, as of true bearings, or 1 port."""
+    return int(bool(view.motion.sides) and view.motion.sides[0].name == "port")
+
+
+def _names(views: Sequence[View], cut: float) -> list[Chart]:
+    """Name the contacts with most bearings, where each was first heard."""
+    found = []
+    for view, color in zip(views[:NAMED], _colors(NAMED), strict=False):
+        heard = sides_heard(view)
+        deg = heard[min(_likely(view), len(heard) - 1)]
+        for first in np.flatnonzero(np.isfinite(deg))[:1]:
+            x, y = float(_placed(deg[first], cut)), float(view.time[first])
+            style = {"xanchor": "left", "yanchor": "bottom", "font": {"size": 11, "color": color}}
+            found.append(text(x, y, escape(view.title), **style))
+    return found
+
+
+def _ticks(every: Floats) -> Chart:
     """Return range and ticks of the axis of bearings, read 0 to 360."""
-    every = np.concatenate([trace["across"] for trace in data]) if data else np.zeros(0)
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 360.0)
     margin = 0.03 * (high - low) + 1.0
     low, high = low - margin, high + margin
-    step = next((each for each in (1, 2, 5, 10, 15, 30) if (high - low) / each <= 9), 45)
+    step = next((each for each in STEPS_DEG if (high - low) / each <= 9), STEPS_DEG[-1])
     ticks = np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
     words = [f"{each % 360:03.0f}" for each in ticks]
     return {"range": [low, high], "tickvals": floats(ticks), "ticktext": words}
