@@ -45,7 +45,6 @@ def tracks(path: Path) -> tuple["pl.DataFrame", tuple[str, ...]]:
     content = _content(path)
     about = content["parameters"]
     parts = [_track(path, i + 1, each) for i, each in enumerate(np.atleast_1d(content["Tracks"]))]
-    noise = getattr(content.get("model"), "R", None)
     table = pl.concat(parts).with_row_index("line", 1)
     table = table.filter(pl.col("time_s").is_finite() & pl.col("tdoa_s").is_finite())
     if table.is_empty():
@@ -58,11 +57,13 @@ def tracks(path: Path) -> tuple["pl.DataFrame", tuple[str, ...]]:
     )
     array = f"an array of two elements {about.d:g} m apart, with sound at {about.c:g} m/s"
     remarks = [f"Time differences of {array}; negative ones in the file are ahead."]
+    noise = _noise(content)
     if noise is not None:
-        table = table.with_columns(sigma_tdoa_s=pl.lit(float(np.sqrt(noise))))
+        table = table.with_columns(sigma_tdoa_s=pl.lit(noise))
         remarks.append(
-            f"Each is taken to be good to {1e6 * np.sqrt(noise):.0f} us, the noise that the "
-            "tracker which wrote them was set to. Their errors are not independent of each other."
+            f"A row is taken to be good to {1e6 * noise:.0f} us: so much it is worth by the noise "
+            "and the chance of hearing that the tracker which wrote it was set to. Errors of "
+            "neighbours are alike, which no row says."
         )
     return table.sort("time_s", maintain_order=True), tuple(remarks)
 
@@ -96,6 +97,19 @@ def _content(path: Path) -> dict[str, Any]:
         names = ", ".join(name for name in content if not name.startswith("__"))
         raise _layout(path, f"it needs Tracks and parameters with c and d, and has {names}")
     return dict(content)
+
+
+def _noise(content: dict[str, Any]) -> float | None:
+    """Standard deviation of a row, s, if rows shall tell no more than was measured.
+
+    A tracker's rows are smooth, one for every step: their own scatter says nothing of their
+    errors, which are alike for seconds. Taken as independent, with the variance R of what the
+    tracker was fed over the share of steps p_D at which it was fed, they tell as much as that.
+    """
+    model: Any = content.get("model")
+    if not hasattr(model, "R"):
+        return None
+    return float(np.sqrt(model.R / getattr(model, "p_D", 1.0)))
 
 
 def _track(path: Path, number: int, each: Any) -> "pl.DataFrame":

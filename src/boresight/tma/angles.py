@@ -78,7 +78,7 @@ def _from_differences(
         raise DataError(
             "time differences need the array's spacing",
             why="angle = arccos(sound speed times tdoa over spacing)",
-            next_step="give --array-spacing, in metres",
+            next_step="give --spacing, in metres",
         )
     cosine = sound * table["tdoa_s"].to_numpy() / spacing
     noise = sound * _each(table, "sigma_tdoa_s", None) / spacing
@@ -101,7 +101,7 @@ def _from_differences(
         raise DataError(
             "every time difference is longer than sound takes from end to end of the array",
             why=f"spacing {spacing[0]:g} m, sound {sound[0]:g} m/s",
-            next_step="correct --array-spacing, or the unit of tdoa_s",
+            next_step="correct --spacing, or the unit of tdoa_s",
         )
     return table
 
