@@ -86,6 +86,16 @@ def test_a_time_twice_is_taken_once(tmp_path):
     assert "averaged" in remarks[0]
 
 
+def test_a_place_that_cannot_be_is_left_out_and_said(tmp_path):
+    rows = [f"{t},43.2,{179.999 + 1e-4 * t - 360 * (t > 10):.6f}" for t in range(21)]
+    rows[7] = "7,0,0"
+    rows[20] = "20,43.2,8.0"
+    file = csv(tmp_path, "\n".join(["time_s,latitude_deg,longitude_deg", *rows]) + "\n")
+    table, remarks = read_own_ship(file)
+    assert table["time_s"].to_list() == [t for t in range(20) if t != 7]
+    assert remarks == ("2 places in own ship's log cannot be, the first in line 9: left out.",)
+
+
 def test_rows_without_a_place_are_counted(tmp_path):
     table, remarks = read_own_ship(csv(tmp_path, GOOD + "4,,20\n5,nan,25\n"))
     assert table.height == 4
@@ -100,6 +110,7 @@ WRONG = {
     "infinite": (GOOD + "4,0,inf\n", "line 6", "inf"),
     "negative speed": ("time_s,north_m,east_m,speed_kt\n0,0,0,-3\n", "line 2", "speed_mps"),
     "two places at once": (GOOD + "3,4000,15\n", "lines 5, 6", "4000 m apart"),
+    "a jump for good": (GOOD + "4,0,9000\n5,0,9005\n", "line 6", "does not come back"),
     "one place": ("time_s,north_m,east_m\n0,0,0\n", "line 2", "one time only"),
     "one time": ("time_s,north_m,east_m\n0,0,0\n0,0,0\n", "line 2", "one time only"),
     "a header alone": ("time_s,north_m,east_m\n", "0 rows", "no row"),

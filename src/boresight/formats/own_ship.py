@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 Array = Any
 _PLACES = (("north_m", "east_m"), ("latitude_deg", "longitude_deg"), ("x_m", "y_m"))
+_DEGREE_M = 111_195.0
+_SWIFT_MPS, _FAR_M = 50.0, 200.0  # faster than ten usual steps, and this, and further: a jump
 _ALIASES = {
     "latitude_deg": ("latitude", "lat", "lat_deg", "boat_latitude"),
     "longitude_deg": ("longitude", "lon", "long", "lng", "lon_deg", "boat_longitude"),
@@ -84,6 +86,7 @@ def own_ship_table(
     if skipped:
         remarks.append(f"{skipped} rows of own ship without a time or a place are skipped.")
     table = _once(path, in_time(table.drop("track", strict=False), remarks), place, remarks)
+    table = _without_jumps(path, table, place, remarks)
     if table.height < 2:
         raise DataError(
             f"{path} holds own ship at one time only",
@@ -127,7 +130,7 @@ def _once(
 
     if table["time_s"].n_unique() == table.height:
         return table
-    metres = 111_195.0 if place[0] == "latitude_deg" else 1.0
+    metres = _DEGREE_M if place[0] == "latitude_deg" else 1.0
     by_time = table.group_by("time_s", maintain_order=True)
     spread = by_time.agg(
         *((pl.col(name).max() - pl.col(name).min()) * metres for name in place), pl.col("line")
@@ -149,6 +152,45 @@ def _once(
     numbers = [pl.col(name).mean() for name in place]
     rest = [pl.col(n).first() for n in table.columns if n not in (*place, "time_s")]
     return by_time.agg(*numbers, *rest)
+
+
+def _without_jumps(
+    path: Path, table: "pl.DataFrame", place: tuple[str, str], remarks: list[str]
+) -> "pl.DataFrame":
+    """Leave out places that own ship jumps to and back from; refuse a jump that lasts."""
+    import polars as pl
+
+    jumps = _jumps(table, place)
+    if not jumps.any():
+        return table
+    spikes = np.append(jumps, True) & np.insert(jumps, 0, True)
+    kept = table.filter(pl.Series(~spikes))
+    left = _jumps(kept, place)
+    if left.any() or kept.height < 2:
+        line = table["line"][int(jumps.argmax()) + 1]
+        raise DataError(
+            f"{path}: own ship jumps, and does not come back",
+            where=f"line {line}, time_s {table['time_s'][int(jumps.argmax()) + 1]:g}",
+            why=f"no ship goes at {_SWIFT_MPS:g} m/s and ten times as fast as it usually does",
+            next_step=f"look at the log there: sed -n {line}p {path}",
+        )
+    remarks.append(
+        f"{int(spikes.sum())} places in own ship's log cannot be, the first in line "
+        f"{table['line'][int(spikes.argmax())]}: left out."
+    )
+    return kept
+
+
+def _jumps(table: "pl.DataFrame", place: tuple[str, str]) -> Array:
+    """(n - 1,) whether a step is one that no ship sails."""
+    a, b = (table[name].to_numpy() for name in place)
+    metres = (_DEGREE_M, _DEGREE_M * np.cos(np.radians(a[:-1]))) if "_deg" in place[0] else (1, 1)
+    turn = (np.diff(b) + 540) % 360 - 180 if "_deg" in place[0] else np.diff(b)
+    away = np.hypot(np.diff(a) * metres[0], turn * metres[1])
+    speed = away / np.diff(table["time_s"].to_numpy())
+    if not len(speed):
+        return np.zeros(0, bool)
+    return (away > _FAR_M) & (speed > max(10 * float(np.median(speed)), _SWIFT_MPS))
 
 
 def _usual_step_m(table: "pl.DataFrame", place: tuple[str, str], metres: float) -> float:
