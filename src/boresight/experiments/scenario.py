@@ -210,6 +210,8 @@ def _pradeep(name: str, own: dict[str, Any], table: dict[str, Any]) -> Scenario:
 
 
 def _scans(table: dict[str, Any]) -> int:
+    if not table["assumed"]["dt_s"] > 0:
+        raise UsageError(f"dt_s={table['assumed']['dt_s']} is no time between bearings")
     return int(table["printed"]["seconds"] / table["assumed"]["dt_s"] + 0.5) + 1
 
 

@@ -57,13 +57,16 @@ def ratio_axis(place: Any) -> None:
     place.autoscale()
 
 
-def draw(folder: Path, prefix: str, drawings: Mapping[int, Drawing], study: Any) -> list[str]:
+def draw(
+    folder: Path, prefix: str, drawings: Mapping[int, Drawing] | Mapping[str, Drawing], study: Any
+) -> list[str]:
     """Write every figure as PREFIX-F<number>.png, and its numbers as CSV beside it.
 
     Args:
         folder: made if it is not there.
         prefix: of the paper.
-        drawings: by number, what makes of the study a figure and its columns.
+        drawings: by number, or by the name of what it shows instead of F<number>: what makes of
+            the study a figure and its columns.
         study: what is drawn.
 
     Returns:
@@ -77,7 +80,8 @@ def draw(folder: Path, prefix: str, drawings: Mapping[int, Drawing], study: Any)
         for number, drawing in drawings.items():
             figure, columns = drawing(study)
             named = {name.replace(",", ""): values for name, values in columns.items()}  # in a CSV
-            files += save(figure, folder / f"{prefix}-F{number}", named)
+            name = f"F{number}" if isinstance(number, int) else number
+            files += save(figure, folder / f"{prefix}-{name}", named)
     return files
 
 

@@ -11,6 +11,7 @@ from boresight.experiments.papers import (
     figures,
     pradeep_claims,
     pradeep_curves,
+    pradeep_figures,
     pradeep_tables,
 )
 from boresight.experiments.papers.pradeep_study import Study
@@ -31,4 +32,4 @@ def reproduce(
         *pradeep_curves.limits(study),
         *pradeep_claims.claims(study),
     ]
-    return claims, []
+    return claims, pradeep_figures.write(study, output) if output else []

@@ -52,9 +52,9 @@ def _sound(study: Study) -> Claim:
             "share of truths lost": {
                 name: float(np.mean(each.lost[:, -1])) for name, each in study.truths.items()
             },
-            "RMSE over the bound, the paper's target": over_bound(study, one),
-            "ANEES, the paper's target": by_time(study, np.mean(one.nees, axis=0)),
-        },
+        }
+        | over_bound(study, "RP")
+        | {"RP, ANEES": by_time(study, np.mean(one.nees, axis=0))},
         verdict=together([each.verdict for each in parts]),
         assumption="over truths drawn from what the bank believes at its start; "
         + reasons(study, "truths", "stable", "consistent"),

@@ -12,6 +12,7 @@ from boresight.experiments.papers.pradeep_words import (
     number,
     over_bound,
     reasons,
+    references,
     rms,
     row,
 )
@@ -75,7 +76,9 @@ def lower_range_error(study: Study) -> Claim:
         ours={
             f"{name}, RMS error of the range, m": by_time(study, rms(each.error[..., 0]))
             for name, each in study.tracked.items()
-        },
+        }
+        | over_bound(study, "RP")
+        | references(study),
         verdict=together([each.verdict for each in errors.values()]),
         assumption=f"squared errors of the same {study.runs} runs at each bearing from "
         f"{study.converge_s:g} s on. {_knowing(study, errors)}",
@@ -113,7 +116,8 @@ def against_ekf(study: Study) -> Claim:
         study,
         "claims",
         "PR-C6",
-        ours={f"{name}, RMSE over the bound": over_bound(study, one) for name, one in both.items()}
+        ours=over_bound(study, "MGEKF")
+        | over_bound(study, "EKF")
         | {
             f"{name}, ANEES": by_time(study, np.mean(one.nees, axis=0))
             for name, one in both.items()

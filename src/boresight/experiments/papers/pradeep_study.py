@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from boresight.errors import unknown
+from boresight.errors import UsageError, unknown
 from boresight.experiments.montecarlo import filtered
+from boresight.experiments.papers.pradeep_references import batch_squares, particle_squares
 from boresight.experiments.papers.pradeep_tracked import Tracked, bounds, own_ship, with_range
 from boresight.experiments.papers.pradeep_truths import Truths, truths
 from boresight.experiments.scenario import SPEEDS_MPS, Scenario, build
@@ -31,6 +32,12 @@ _FILTERS = {  # entry of the catalogue, and whether it starts knowing the range 
     NEAR: ("mgekf", True),
     "EKF started near": ("ekf", True),
 }
+_SETTINGS = {
+    "bank": ("cells", "nearest_m", "farthest_m", "prune"),
+    "mgekf": ("may_grow",),
+    "ekf": (),
+}
+_LEAST = {"truths": 2, "particles": 100, "particle_runs": 2, "speed_sd_mps": 0.1}
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,12 @@ class Study:
     table: dict[str, Any]
     asked: int | None
     seed: int
+
+    def __post_init__(self) -> None:
+        """Assumptions that no model would refuse by itself."""
+        for name, least in _LEAST.items():
+            if not self.assumed[name] >= least:
+                raise UsageError(f"{name}={self.assumed[name]} is less than {least:g}")
 
     @property
     def assumed(self) -> dict[str, Any]:
@@ -126,22 +139,18 @@ class Study:
             for label, (_, is_near) in _FILTERS.items()
         }
 
-    def track(
-        self, label: str, world: Scenario, truth: Truth, plots: Plots, **outputs: Any
-    ) -> Tracked:
+    def track(self, label: str, world: Scenario, truth: Truth, plots: Plots) -> Tracked:
         """What one of the filters makes of plots; banks tell their weights too."""
         name = _FILTERS[label][0].format(member=self.assumed["member"])
         is_bank = name.startswith("rp-")
-        settings = {n: self.assumed[n] for n in ("cells", "nearest_m", "farthest_m", "prune")}
-        kept = ("mean", "cov", *(("kept_log_weights",) if is_bank else ()))
+        own = _SETTINGS["bank" if is_bank else name]
         found = filtered(
             name,
             world.motion,
             world.sensor,
             plots,
-            settings=settings if is_bank else None,
-            outputs=kept,
-            **outputs,
+            settings={setting: self.assumed[setting] for setting in own},
+            outputs=("mean", "cov", *(("kept_log_weights",) if is_bank else ())),
         )
         return Tracked(truth, own_ship(world), found, self.criteria)
 
@@ -188,3 +197,21 @@ class Study:
         number = self.asked or int(self.assumed["truths"])
         world, at = self.worlds["pradeep-anywhere"], [self.at(second) for second in self.shown_s]
         return truths(world, self.track, at, number, self.seed)
+
+    @cached_property
+    def references(self) -> dict[str, Array]:
+        """Squared position errors, m², (runs, times) at `reference_s`, by estimator."""
+        truth, plots = self.simulated
+        at = [self.at(second) for second in self.reference_s]
+        cloud = particle_squares(self.world, truth, plots, self.assumed, at, self.seed)
+        found = {f"{self.assumed['particles']} particles": cloud}
+        if self.assumed["accel_mps2"]:  # the batch estimate is of a track without noise
+            return found
+        starts = [self.tracked[label].estimate.mean for label in ("RP", "MGEKF")]
+        batch = batch_squares(self.world, truth, plots, np.stack(starts, axis=2), at)
+        return {"batch": batch} | found
+
+    @property
+    def reference_s(self) -> list[float]:
+        """Times at which there are references: once own ship has turned."""
+        return self.shown_s[1:]

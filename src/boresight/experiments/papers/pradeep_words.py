@@ -11,7 +11,6 @@ import numpy as np
 
 from boresight.experiments.consistency import bias
 from boresight.experiments.papers.pradeep_study import Study
-from boresight.experiments.papers.pradeep_tracked import Tracked
 from boresight.experiments.verdicts import Claim
 
 Array = Any
@@ -51,10 +50,29 @@ def rms(error: Array) -> Array:
     return np.sqrt(np.mean(np.square(error), axis=0))
 
 
-def over_bound(study: Study, one: Tracked) -> dict[str, dict[str, float | None]]:
-    """RMSE of the position over the bound at the times that are shown, and its standard error."""
-    mean = bias(one.square)
-    ratio = np.sqrt(mean.value) / study.bound_m
+def over_bound(study: Study, label: str) -> dict[str, dict[str, float | None]]:
+    """A filter's RMSE of the position over the bound, at the times that are shown."""
+    at = [study.at(second) for second in study.shown_s]
+    return _ratios(study, label, study.shown_s, study.tracked[label].square[:, at])
+
+
+def references(study: Study) -> dict[str, dict[str, float | None]]:
+    """The same of a batch estimate and of particles, once own ship has turned."""
+    found: dict[str, dict[str, float | None]] = {}
+    for name, square in study.references.items():
+        found |= _ratios(study, f"{name}, {len(square)} runs", study.reference_s, square)
+    return found
+
+
+def _ratios(
+    study: Study, label: str, times_s: list[float], square: Array
+) -> dict[str, dict[str, float | None]]:
+    """Ratios and their standard errors, by time, of squared errors (runs, times)."""
+    mean, names = bias(square), [f"{second:g} s" for second in times_s]
+    ratio = np.sqrt(mean.value) / study.bound_m[[study.at(second) for second in times_s]]
     error = 0.5 * ratio * mean.standard_error / mean.value
-    values, errors = by_time(study, ratio), by_time(study, error)
-    return {t: {"ratio": values[t], "standard error": errors[t]} for t in values}
+    told = {"RMSE over the bound": ratio, "standard error of that": error}
+    return {
+        f"{label}, {kind}": dict(zip(names, map(number, values), strict=True))
+        for kind, values in told.items()
+    }
