@@ -20,6 +20,7 @@ SCRIPTS: dict[str, tuple[str, ...]] = {  # packages without which there is nothi
     "accuracy": (),
     "peers": ("filterpy", "stonesoup", "dynamax", "nrl-tracker"),
     "registration": (),
+    "bearings_only": (),
     "startup": (),
     "commands": ("pytest",),  # whose tests hold the bad files
     "asterix": ("aviconv-asterix", "libasterix"),
