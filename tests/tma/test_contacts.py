@@ -139,6 +139,14 @@ def test_a_heading_through_north_is_not_averaged_through_south():
     assert np.allclose(np.degrees(found.bearing_rad), 20.0, rtol=0, atol=1e-9)
 
 
+def test_holes_in_the_heading_are_filled_from_both_sides():
+    heading = [None if t % 10 else (350.0 + 0.2 * t) % 360 for t in range(101)]
+    times = 0.5 + np.arange(50.0)
+    relative = pl.DataFrame({"time_s": times, "bearing_relative_deg": 0.0 * times})
+    found, _ = one(relative, ship(heading_deg=pl.Series(heading)), sigma_deg=1)
+    assert np.allclose(np.degrees(found.bearing_rad), 0.2 * times - 10, rtol=0, atol=1e-9)
+
+
 def test_cones_are_off_the_array_s_axis():
     cones = heard(conical=True)
     found, _ = one(cones, ship(), sigma_deg=1)

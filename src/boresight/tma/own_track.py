@@ -175,9 +175,9 @@ def own_track(table: "pl.DataFrame", clock_s: float, remarks: list[str]) -> OwnT
             "turned to North at its first place."
         )
     logged = {
-        name: np.radians(table[f"{name}_deg"].to_numpy()) + north
+        name: _between(time_s, np.radians(table[f"{name}_deg"].cast(float).to_numpy())) + north
         for name in ("heading", "axis")
-        if f"{name}_deg" in table.columns and table[f"{name}_deg"].null_count() == 0
+        if f"{name}_deg" in table.columns and table[f"{name}_deg"].count()
     }
     velocity = _velocity(table, time_s, position, north, remarks)
     return OwnTrack(
@@ -188,6 +188,12 @@ def own_track(table: "pl.DataFrame", clock_s: float, remarks: list[str]) -> OwnT
         north_rad=north,
         angles=logged,
     )
+
+
+def _between(time_s: Array, angle: Array) -> Array:
+    """Angles (n,) without a turn between neighbours, holes (NaN) filled from both sides."""
+    known = np.isfinite(angle)
+    return np.interp(time_s, time_s[known], np.unwrap(angle[known]))
 
 
 def _plane(table: "pl.DataFrame") -> tuple[Array, Array, Site | None]:
