@@ -10,9 +10,12 @@ no such bank: its bearings-only EKF filters one run, and is held to our `ekf`. T
 one thread, taken in turn in one process.
 """
 
+import os
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
