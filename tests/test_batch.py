@@ -15,9 +15,10 @@ from mixtures import heard
 from oracles import pradeep as paper
 
 STEPS = 301
-OWN = heard.OWN[:STEPS, ::-1]  # North, East
+AWAY = np.array([700.0, -2_500.0])  # own ship does not begin at the origin
+OWN = AWAY + heard.OWN[:STEPS, ::-1]  # North, East
 COURSE_SPEED = paper.TARGET * paper.heading(paper.COURSE)[::-1]
-LAST = np.hstack([paper.target(paper.TARGET)[STEPS - 1, ::-1], COURSE_SPEED])
+LAST = np.hstack([AWAY + paper.target(paper.TARGET)[STEPS - 1, ::-1], COURSE_SPEED])
 DT = heard.every_second(STEPS)
 SPEED = 11.0
 PRIOR = batch.range_prior(heard.straight(), SPEED, 1_000.0, 20_000.0)
@@ -234,7 +235,7 @@ def test_of_a_cone_the_side_that_fits():
 
 
 def test_without_a_manoeuvre_the_range_that_is_believed_keeps_it_off_own_ship():
-    own = np.outer(np.arange(120.0), OWN[1] - OWN[0])
+    own = AWAY + np.outer(np.arange(120.0), OWN[1] - OWN[0])
     last = LAST - np.hstack([181.0 * COURSE_SPEED, 0.0, 0.0])
     z = noisy(20, own=own, last=last)
     ours = fit(z, own)

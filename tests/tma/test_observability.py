@@ -94,6 +94,8 @@ def test_a_manoeuvre_tells_within_half_a_minute():
         assert found.observable
         assert found.manoeuvred
         assert 121.0 < found.since_s < 150.0
+        assert not seen(OWN, seed, steps=int(found.since_s)).observable
+        assert seen(OWN, seed, steps=int(found.since_s) + 1).observable
         assert np.all(np.isinf(found.by_step[:120]))
         assert 50.0 < found.range_sd_m < 110.0
 
@@ -184,7 +186,28 @@ def test_at_best_falls_as_own_ship_goes_on():
     contact = contact_of(OWN)
     late = observe(contact, bank_of(contact), position_sd_m=1e-3)
     away = np.hypot(*(TARGET[-1] - OWN[-1]))
-    assert late.at_best_percent == pytest.approx(100.0 * late.range_sd_m / away, rel=0.1)
+    assert 0.5 < late.at_best_percent / (100.0 * late.range_sd_m / away) < 1.1
+
+
+def test_at_best_is_of_targets_on_the_bearings_whatever_the_bank_believes():
+    contact = contact_of(OWN)
+    far = OWN[-1] + 10.0 * (TARGET[-1] - OWN[-1])
+    astray = np.hstack([far, (far - TARGET[0]) / 800.0])  # began where the target did
+    answer = observe(contact, believing([astray], [1.0]), position_sd_m=1e-3)
+    assert answer.range_sd_m / np.hypot(*(far - OWN[-1])) > 0.02
+    assert 0.2 < answer.at_best_percent < 0.6  # the truth's is 0.53
+
+
+def test_at_best_follows_a_cone_from_one_side_of_the_axis_to_the_other():
+    contact, speed = contact_of(OWN, cone=True), paper.TARGET * paper.heading(paper.COURSE)[::-1]
+    truth = np.hstack([TARGET[-1], speed])
+    answer = observe(contact, believing([truth], [1.0]), position_sd_m=1e-3)
+    # Tracks a little nearer, still on the bearings, are told better than the truth.
+    assert (
+        0.2
+        < answer.at_best_percent
+        < 0.9 * 100.0 * answer.range_sd_m / np.hypot(*(TARGET[-1] - OWN[-1]))
+    )
 
 
 def test_between_two_looks_it_is_what_it_was(monkeypatch):

@@ -79,15 +79,20 @@ def observe(
 
 def _by_cell(contact: Contact, bank: Bank, checked: Array) -> tuple[Array, Array]:
     """Bound of the range in m and in per cent of it, (checked, cells); infinite for light cells."""
-    means, weights = bank.means[checked, :, :4], np.nan_to_num(bank.weights[checked])
-    light = (1.0 - SHARE) / 2.0 / weights.shape[1]
-    heavy = (weights > light) & np.isfinite(means).all(-1)
+    means = bank.means[checked, :, :4]
+    heavy = _heavy(bank.weights[checked], means)
     which, cell = np.nonzero(heavy)
     at = checked[which]
     sd = np.full(heavy.shape, np.inf)
     sd[which, cell] = _range_bound(contact, means[which, cell], at)
     away = np.linalg.norm(means[..., :2] - contact.position_m[checked][:, None], axis=-1)
     return sd, 100.0 * sd / np.where(heavy, np.maximum(away, 1e-3), 1.0)
+
+
+def _heavy(weights: Array, means: Array) -> Array:
+    """Which cells (..., cells) count: all the others together have half of what may disagree."""
+    light = (1.0 - SHARE) / 2.0 / weights.shape[-1]
+    return (np.nan_to_num(weights) > light) & np.isfinite(means[..., :4]).all(-1)
 
 
 def _range_bound(contact: Contact, states: Array, at: Array) -> Array:
@@ -114,9 +119,11 @@ def _wandered(contact: Contact) -> Array:
 
 def _at_best(contact: Contact, bank: Bank) -> float:
     """Smallest bound, in per cent of the range, of any straight track on the bearings heard."""
-    tracks = _on_bearings(contact, _first_ranges(contact, bank))
-    if not len(tracks):
+    ranges = _first_ranges(contact, bank)
+    sides = [_on_bearings(contact, ranges, bearing) for bearing in _sides(contact, bank)]
+    if not sum(map(len, sides)):
         return np.inf
+    tracks = np.concatenate(sides)
     last = tracks.copy()
     last[:, :2] += tracks[:, 2:] * (contact.time_s[-1] - contact.time_s[0])
     sd = _range_bound(contact, last, np.full(len(last), len(contact.time_s) - 1))
@@ -131,14 +138,11 @@ def _first_ranges(contact: Contact, bank: Bank) -> Array:
     return np.geomspace(away.min() / 2.0, away.max() * 2.0, _RANGES) if len(away) else away
 
 
-def _on_bearings(contact: Contact, ranges: Array) -> Array:
-    """(tracks, 4) at the first bearing: from each range there, the best velocity, if one fits."""
-    sides = [_on_side(contact, ranges, bearing) for bearing in _sides(contact)]
-    return np.concatenate(sides)
+def _on_bearings(contact: Contact, ranges: Array, bearing: Array) -> Array:
+    """(tracks, 4) at the first step: from each range there, the best velocity, if one fits.
 
-
-def _on_side(contact: Contact, ranges: Array, bearing: Array) -> Array:
-    """As `_on_bearings`, for true bearings (steps,), NaN where nothing was heard."""
+    Bearings (steps,) are true ones, NaN where nothing was heard.
+    """
     heard = np.flatnonzero(np.isfinite(bearing))
     if not len(heard):
         return np.zeros((0, 4))
@@ -158,9 +162,18 @@ def _on_side(contact: Contact, ranges: Array, bearing: Array) -> Array:
     return np.hstack([start, v])[fits]
 
 
-def _sides(contact: Contact) -> list[Array]:
-    """True bearings (steps,), of each side on which they may be; NaN where not heard."""
+def _sides(contact: Contact, bank: Bank) -> list[Array]:
+    """True bearings (steps,), NaN where not heard; of cones, on the sides that a cell keeps to.
+
+    Own ship's turns bring a target from one side of the axis to the other, so that a side is a
+    side at every step.
+    """
     if not contact.is_conical:
         return [contact.bearing_rad]
-    both = [contact.axis_rad + side * contact.cone_rad for side in (-1.0, 1.0)]
-    return [np.where(np.isnan(contact.bearing_rad), b, contact.bearing_rad) for b in both]
+    ago = contact.time_s - contact.time_s[-1]
+    held = bank.means[-1, _heavy(bank.weights[-1], bank.means[-1]), :4]
+    away = held[:, None, :2] + held[:, None, 2:] * ago[:, None] - contact.position_m
+    off = wrap(np.arctan2(away[..., 1], away[..., 0]) - contact.axis_rad)
+    patterns = np.unique(np.where(off < 0.0, -1.0, 1.0), axis=0)
+    cones = contact.axis_rad + patterns * contact.cone_rad
+    return list(np.where(np.isnan(contact.bearing_rad), cones, contact.bearing_rad))
