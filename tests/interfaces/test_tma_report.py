@@ -10,6 +10,7 @@ import tma_example as made
 from html_page import Page, embedded, needs_chromium, running_browser, unpack
 from scipy import stats
 
+from boresight import catalogue
 from boresight.interfaces.report import report, tma_picture, tma_residuals, tma_waterfall
 from boresight.interfaces.report.tma_history import allowed, marks, panels
 from boresight.interfaces.report.tma_verdict import sentences, summary
@@ -23,6 +24,7 @@ from boresight.interfaces.report.tma_words import (
     hull,
     region,
 )
+from boresight.tma.analyse import analyse
 from boresight.tma.result import Quantity, TmaResult
 
 MEGABYTE = 1_000_000
@@ -84,7 +86,17 @@ def test_of_many_contacts_all_are_in_the_table_and_the_first_are_folded(many):
     assert table.count("<tr") == 1 + 43
     inside = {link.removeprefix("#") for link in page.links if link.startswith("#")}
     assert {f"c{i}-verdict" for i in range(1, 13)} <= inside <= set(page.ids)
-    assert "The first 12 can be opened below" in " ".join(page.text)
+    assert "The first 12 can be opened below." in " ".join(page.text)
+
+
+@pytest.mark.parametrize("kind", [{}, {"turns": False}, {"conical": True}])
+def test_what_the_analysis_answers_makes_a_page(kind):
+    heard, _ = made.contact("real", 240, **kind)
+    answer = analyse(heard, catalogue.lookup("rp-ekf"))
+    page = Page(report(motion=TmaResult(contacts=(answer,))).html)
+    assert page.faults == []
+    assert ("The range cannot be told yet:" in page.text) is not answer.observable
+    assert set(SECTIONS.split()) <= set(page.ids)
 
 
 def test_text_from_the_file_cannot_leave_its_element(states):
@@ -128,6 +140,7 @@ def test_each_state_is_said_in_plain_words(states):
     assert "Never good enough" in said(states["no turn"])
     assert "Both sides of the array are possible" in said(states["sides"])
     assert "starboard with 56.0 %" in said(states["sides"])
+    assert "at the last bearing" not in said(states["sides"])
     assert "The contact is to starboard</b> (probability 99.8 %)" in said(states["side decided"])
     assert "Only 3 bearings" in said(states["three"])
     assert "did not settle" in said(states["bare"])

@@ -76,7 +76,7 @@ def motion(
     sd = {"range": away * np.where(known, 4.0 / np.maximum(time - TURN_S, 1.0) + 0.01, 0.4)}
     sd["bearing"] = SIGMA_DEG / np.sqrt(np.minimum(time + 1, 40.0))
     sd["course"] = np.where(known, 150.0 / np.maximum(time - TURN_S, 1.0), 90.0)
-    sd["speed"] = np.where(known, 90.0 / np.maximum(time - TURN_S, 1.0), 8.0)
+    sd["speed"] = np.where(known, 90.0 / np.maximum(time - TURN_S, 1.0), 2.5)
     bearing = np.degrees(np.arctan2(*(track - own).T[::-1])) % 360
     here = {
         "range": away,
@@ -118,6 +118,8 @@ def motion(
             Side(name="starboard", probability=share, **told),
             Side(name="port", probability=1 - share, **other),
         )
+    if conical and not decided:  # between the sides there is nothing
+        told |= {"bearing_deg": quantity(*last["bearing"], known=False)}
     mean = np.array([*track[-1], -4.0, 6.0])
     cov = np.diag([last["range"][1] ** 2, (0.3 * last["range"][1]) ** 2, 0.1, 0.1])
     noise = np.degrees(heard.sigma_rad) * np.random.default_rng(7).standard_normal(steps)

@@ -30,8 +30,8 @@ CONTACTS = (
     "rests on what was believed before.{rest}</p>"
 )
 REST = (
-    " The first {shown} can be opened below; of the others this table, the page's JSON and the "
-    "tables beside the page say all that is known."
+    " The first {shown} can be opened below. Any of the others has a page of its own if the "
+    "analysis is run for that one, by its name: <code>--track NAME</code>."
 )
 
 

@@ -27,7 +27,10 @@ CAPTION_MANY = (
     "Time runs down, bearing across. Dots: bearings as heard; lines: as estimated; grey and "
     "dashed: own ship's heading. Names are those of the contacts with most bearings."
 )
-CONE = " A cone is heard on either side of the array: pale and hollow is the less likely one."
+CONE = (
+    " A cone is heard on either side of the array's axis, dotted ahead and astern: pale and hollow "
+    "is the less likely side."
+)
 MOST_DOTS = 12_000  # of all contacts together
 NAMED = 12  # more names than these hide the picture
 STANDING_MPS = 0.05  # slower, own ship has no heading that its velocity tells
@@ -38,8 +41,11 @@ COLORS = (charts.BLUE, charts.ORANGE, charts.GREEN, charts.PURPLE, "#b58900", "#
 def panel(views: Sequence[View], name: str = "waterfall-chart") -> Panel:
     """Draw the waterfall of one contact or of all."""
     cut, is_alone = _cut(views), len(views) == 1
-    time, heading = _heading(views)
-    data = [_line(heading, time, cut, charts.MUTED, "own ship's heading", dash="dash")]
+    time, heading, axis = _own_ship(views)
+    data = [_line(heading, time, cut, charts.MUTED, "own ship's heading", "dash")]
+    if np.isfinite(axis).any():
+        data.append(_line(axis, time, cut, charts.MUTED, "array's axis", "dot"))
+        data.append(_line(axis + 180.0, time, cut, charts.MUTED, "array's axis, astern", "dot"))
     step = -(-sum(len(view.kept) for view in views) // MOST_DOTS) or 1
     for view, color in zip(views, _colors(len(views)), strict=True):
         data += _alone(view, cut, color) if is_alone else _among(view, cut, color, step)
@@ -87,16 +93,17 @@ def _line(deg: Floats, time: Floats, cut: float, color: str, name: str, dash: st
     return line(x, y, color, name=name, line=style, hoverinfo="skip")
 
 
-def _heading(views: Sequence[View]) -> tuple[Floats, Floats]:
-    """Return times and own ship's course, degrees, over all that was heard; NaN where it stood."""
+def _own_ship(views: Sequence[View]) -> tuple[Floats, Floats, Floats]:
+    """Return times, own ship's course (NaN where it stood), and the axis of what hears cones."""
     contacts = [view.motion.contact for view in views]
-    time = np.concatenate([each.time_s for each in contacts])
-    north, east = np.concatenate([each.velocity_mps for each in contacts]).T
-    time, first = np.unique(time, return_index=True)
+    time, first = np.unique(np.concatenate([each.time_s for each in contacts]), return_index=True)
     kept = thinned(len(time))
-    north, east = north[first][kept], east[first][kept]
-    course = np.degrees(np.arctan2(east, north))
-    return time[kept], np.where(np.hypot(north, east) > STANDING_MPS, course, np.nan)
+    north, east = np.concatenate([each.velocity_mps for each in contacts])[first][kept].T
+    course = np.where(np.hypot(north, east) > STANDING_MPS, np.arctan2(east, north), np.nan)
+    axis = np.concatenate(
+        [np.where(np.isfinite(each.cone_rad), each.axis_rad, np.nan) for each in contacts]
+    )
+    return time[kept], np.degrees(course), np.degrees(axis[first][kept])
 
 
 def _alone(view: View, cut: float, color: str) -> Iterator[Chart]:
