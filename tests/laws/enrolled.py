@@ -187,12 +187,14 @@ FILTERS = (
 CURVED = tuple(entry for entry in FILTERS if entry.curved)
 BY_EAR = (
     Entry("modified-polar", own_state=True, straight=True),
-    Entry("rp-modified-polar", own_state=True, bank=True, straight=True),
-    Entry("rp-ekf", own_state=True, bank=True),
-    Entry("rp-ekf", {"cells": 3, "prune": 0.0}, own_state=True, bank=True),
-    Entry("rp-mgekf", own_state=True, bank=True),
-    Entry("rp-ukf", by_axes=True, own_state=True, bank=True),
-    Entry("rp-ckf", by_axes=True, own_state=True, bank=True),
+    Entry("modified-polar", {"predicted": "first order"}, own_state=True, straight=True),
+    Entry("rp-ekf", bank=True),
+    Entry("rp-ekf", {"cells": 3, "prune": 0.0}, bank=True),
+    Entry("rp-mgekf", bank=True),
+    Entry("rp-ukf", by_axes=True, bank=True),
+    Entry("rp-ckf", by_axes=True, bank=True),
+    # Six cells on each side of a cone are more than a kernel holds.
+    Entry("rp-modified-polar", {"cells": 3}, own_state=True, straight=True, bank=True),
 )
 
 LINEAR_WORLDS = (World(SPACE, POINT), World(PLANE, FLAT), World(PLANE, OBLONG))

@@ -55,7 +55,7 @@ def test_a_batch_is_its_lanes_and_a_run_is_its_steps_bit_for_bit(entry, world):
             states = one.final
             for name in OUTPUTS:
                 np.testing.assert_array_equal(one.others[name][0, 0], batch.others[name][lane, t])
-    if not entry.own_state:
+    if not (entry.own_state or entry.bank):
         np.testing.assert_array_equal(batch.final["mean"], batch.mean[:, -1])
 
 
@@ -130,11 +130,9 @@ def test_a_lane_that_fails_says_so_and_leaves_its_neighbours_bits_alone(entry, w
         cov[2, -1, -1] = in_cov
     sick = run_recursion(recursion, z, 2.0, Gaussian(mean, cov), outputs=OUTPUTS)
     others = [lane for lane in range(LANES) if lane != 2]
-    if (
-        entry.own_state and not entry.bank and status is Status.NOT_POSITIVE
-    ):  # its points are not numbers then
-        status = Status.NOT_FINITE
-    assert (sick.status[2] == status).all()
+    # Where points are taken of it, they are not numbers.
+    told = {status, Status.NOT_FINITE} if entry.own_state else {status}
+    assert set(sick.status[2]) <= told
     assert (healthy.status == Status.OK).all()
     for name in OUTPUTS:
         np.testing.assert_array_equal(sick.others[name][others], healthy.others[name][others])

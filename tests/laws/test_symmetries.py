@@ -127,8 +127,8 @@ def test_a_missing_component_is_a_component_the_sensor_does_not_have(entry, worl
         fields = {name.replace("_rad", "_deg"): None}
         if name.startswith("range"):  # what is left is correlated with nothing
             fields["range_rate_correlation"] = None
-        if entry.bank and name != "range_rate_mps":
-            continue  # nothing that it could begin on is left
+        if len(world.sensor.names) == 1 or (entry.bank and name == "azimuth_rad"):
+            continue  # nothing is left, or nothing that a bank begins on
         reduced = replace(world.sensor, **fields)
         gap = z.copy()
         gap[i] = np.nan
@@ -152,7 +152,7 @@ def test_a_plot_without_any_component_changes_nothing(entry, world, seed):
         if name in ("mean", "means"):
             np.testing.assert_array_equal(after[name], leaf)
     post = entry.update(world, mean, cov, np.full(len(z), np.nan))
-    if not entry.own_state:
+    if not (entry.own_state or entry.bank):
         np.testing.assert_array_equal(post.mean, mean)
         np.testing.assert_allclose(post.cov, cov, rtol=1e-12, atol=1e-12 * np.max(cov))
     assert (post.nis, post.dof, post.loglik) == (0, 0, 0)

@@ -162,7 +162,8 @@ def locate(
     lacking = [name for name in needed if name not in sensor.names]
     if lacking:
         raise UsageError(
-            f"a plot without {lacking[0]} does not say where the target is", next_step=_GIVE
+            f"a plot without {lacking[0]} does not say where the target is",
+            next_step=f"{_GIVE}, or use rp-ekf" if _BEARINGS & set(sensor.names) else _GIVE,
         )
     columns = [sensor.names.index(name) for name in needed]
     spreads = [_first(getattr(sensor, name.replace("_rad", "_deg"))) for name in needed]
@@ -184,6 +185,7 @@ def _in_track_frame(position: Array, cov: Array, sensor: Radar) -> tuple[Array, 
 
 
 _GIVE = "give the start: start=Gaussian(mean, cov)"
+_BEARINGS = {"azimuth_rad", "cone_rad"}  # what a bank of ranges begins on
 
 
 def _first(sigma: Any) -> Any:
