@@ -270,6 +270,25 @@ def test_no_bearing_makes_the_covariance_grow_unless_it_may(seed, turn):
     assert size(found) < 4.0 + 1e-6
 
 
+@pytest.mark.parametrize(
+    ("turn_deg", "settings", "is_h"),
+    [
+        (50.0, {}, False),
+        (-50.0, {}, False),
+        (70.0, {}, True),
+        (-70.0, {}, True),
+        (70.0, {"widest_deg": 80.0}, False),
+        (20.0, {"widest_deg": 10.0}, True),
+    ],
+)
+def test_beyond_sixty_degrees_the_gain_function_is_the_gradient(turn_deg, settings, is_h):
+    X, P = paper.start(0.3, 3_000.0, 500.0, SPEED_SD, sigma=0.1)
+    prior = Gaussian(X[paper.OURS], P[paper.OURS][:, paper.OURS])
+    z = np.array([0.3 + np.radians(turn_deg)])
+    found = mgekf.update(prior, z, [azimuth()], may_grow=True, **settings).cov
+    assert np.array_equal(found, ekf.update(prior, z, [azimuth()]).cov) is is_h
+
+
 def cells_of(z):
     """Six extended filters a run, as lanes: states, innovations, variances, with a cell's axis."""
     X, P = paper.start(z[:, :1], *CELLS, SPEED_SD)

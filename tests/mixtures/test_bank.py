@@ -74,6 +74,59 @@ def agree(apart, fused):
     assert np.max(np.abs(fused["cov"] - cov) / (scale[:, None] * scale[..., None])) < 1e-12
 
 
+@given(st.floats(10.0, 5e3), st.floats(1.5, 100.0), st.integers(1, 12))
+def test_cells_cover_the_ranges_and_grow_alike(nearest, ratio, cells):
+    """As ranges that are uniform in each: half as far again on either side of the middle."""
+    middles, spreads = range_cells(nearest, ratio * nearest, cells)
+    low, high = middles - spreads * np.sqrt(3.0), middles + spreads * np.sqrt(3.0)
+    assert low[0] == pytest.approx(nearest)
+    assert high[-1] == pytest.approx(ratio * nearest)
+    np.testing.assert_allclose(low[1:], high[:-1])
+    np.testing.assert_allclose(high / low, ratio ** (1.0 / cells))
+
+
+def test_cells_that_overlap_are_wider_and_nothing_else():
+    middles, spreads = RangeParameterised(overlap=1.5).ranges
+    np.testing.assert_allclose(middles, RangeParameterised().ranges[0])
+    np.testing.assert_allclose(spreads, 1.5 * RangeParameterised().ranges[1])
+
+
+@given(st.floats(-3.1, 3.1), st.floats(0.01, 5.0), st.floats(-3.1, 3.1))
+def test_each_cell_begins_on_the_bearing_at_its_own_range(bearing, sigma_deg, axis):
+    """Whatever range the start had: the angle's spread counts, and lies across the bearing."""
+    c, s = np.cos(axis), np.sin(axis)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    place = np.array([300.0, -700.0, 0.0])
+    sensor = Radar(azimuth_deg=sigma_deg, pose=Pose(position_m=place, rotation=turn))
+    bank = RangeParameterised(cells=4, nearest_m=500.0, farthest_m=9_000.0)
+    start = bank.start(np.array([[bearing - axis]]), straight(), sensor, speed_mps=7.0)
+    cells, side = starts(bank, Gaussian(start.mean[0], start.cov[0]), straight(), sensor)
+    assert np.array_equal(side, np.zeros(4))
+    along = np.array([np.cos(bearing), np.sin(bearing)])
+    across = np.array([-along[1], along[0]])
+    for cell, middle, spread in zip(cells, *bank.ranges, strict=True):
+        np.testing.assert_allclose(cell.mean[:2], place[:2] + middle * along, rtol=1e-9)
+        expected = spread**2 * np.outer(along, along)
+        expected += (middle * np.radians(sigma_deg)) ** 2 * np.outer(across, across)
+        np.testing.assert_allclose(cell.cov[:2, :2], expected, atol=1e-9 * middle**2)
+        np.testing.assert_allclose(cell.cov[2:, 2:], 49.0 * np.eye(2))
+        assert not np.any(cell.cov[:2, 2:])
+
+
+@given(st.integers(0, 2**32))
+def test_the_start_of_the_bank_is_the_mixture_of_its_cells(seed):
+    generator = np.random.default_rng(seed)
+    bank = RangeParameterised(cells=5)
+    z, sensor = generator.uniform(-3.0, 3.0, (1, 1)), bearings_from(OWN[:1])
+    whole = bank.start(z, straight(), sensor, speed_mps=9.0)
+    cells, _ = starts(bank, Gaussian(whole.mean[0], whole.cov[0]), straight(), sensor)
+    mixture = moments([0.2] * 5, cells)
+    np.testing.assert_allclose(whole.mean[0], mixture.mean, rtol=1e-12)
+    along = np.array([np.cos(z[0, 0]), np.sin(z[0, 0])])
+    ours, theirs = (along @ cov[:2, :2] @ along for cov in (whole.cov[0], mixture.cov))
+    assert ours == pytest.approx(theirs, rel=1e-12)
+
+
 @pytest.mark.parametrize("prune", [0.0, 1e-3])
 @pytest.mark.parametrize("member", MEMBERS)
 def test_weights_afterwards_are_weights_step_by_step(member, prune):
@@ -152,53 +205,6 @@ def test_the_best_cell_alone():
         np.testing.assert_allclose(
             fused[name][1:], told[1:], atol=1e-9 * scale
         )  # at 0 all are best
-
-
-@given(st.floats(10.0, 5e3), st.floats(1.5, 100.0), st.integers(1, 12))
-def test_cells_cover_the_ranges_and_grow_alike(nearest, ratio, cells):
-    """As ranges that are uniform in each: half as far again on either side of the middle."""
-    middles, spreads = range_cells(nearest, ratio * nearest, cells)
-    low, high = middles - spreads * np.sqrt(3.0), middles + spreads * np.sqrt(3.0)
-    assert low[0] == pytest.approx(nearest)
-    assert high[-1] == pytest.approx(ratio * nearest)
-    np.testing.assert_allclose(low[1:], high[:-1])
-    np.testing.assert_allclose(high / low, ratio ** (1.0 / cells))
-
-
-@given(st.floats(-3.1, 3.1), st.floats(0.01, 5.0), st.floats(-3.1, 3.1))
-def test_each_cell_begins_on_the_bearing_at_its_own_range(bearing, sigma_deg, axis):
-    """Whatever range the start had: the angle's spread counts, and lies across the bearing."""
-    c, s = np.cos(axis), np.sin(axis)
-    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    place = np.array([300.0, -700.0, 0.0])
-    sensor = Radar(azimuth_deg=sigma_deg, pose=Pose(position_m=place, rotation=turn))
-    bank = RangeParameterised(cells=4, nearest_m=500.0, farthest_m=9_000.0)
-    start = bank.start(np.array([[bearing - axis]]), straight(), sensor, speed_mps=7.0)
-    cells, side = starts(bank, Gaussian(start.mean[0], start.cov[0]), straight(), sensor)
-    assert np.array_equal(side, np.zeros(4))
-    along = np.array([np.cos(bearing), np.sin(bearing)])
-    across = np.array([-along[1], along[0]])
-    for cell, middle, spread in zip(cells, *bank.ranges, strict=True):
-        np.testing.assert_allclose(cell.mean[:2], place[:2] + middle * along, rtol=1e-9)
-        expected = spread**2 * np.outer(along, along)
-        expected += (middle * np.radians(sigma_deg)) ** 2 * np.outer(across, across)
-        np.testing.assert_allclose(cell.cov[:2, :2], expected, atol=1e-9 * middle**2)
-        np.testing.assert_allclose(cell.cov[2:, 2:], 49.0 * np.eye(2))
-        assert not np.any(cell.cov[:2, 2:])
-
-
-@given(st.integers(0, 2**32))
-def test_the_start_of_the_bank_is_the_mixture_of_its_cells(seed):
-    generator = np.random.default_rng(seed)
-    bank = RangeParameterised(cells=5)
-    z, sensor = generator.uniform(-3.0, 3.0, (1, 1)), bearings_from(OWN[:1])
-    whole = bank.start(z, straight(), sensor, speed_mps=9.0)
-    cells, _ = starts(bank, Gaussian(whole.mean[0], whole.cov[0]), straight(), sensor)
-    mixture = moments([0.2] * 5, cells)
-    np.testing.assert_allclose(whole.mean[0], mixture.mean, rtol=1e-12)
-    along = np.array([np.cos(z[0, 0]), np.sin(z[0, 0])])
-    ours, theirs = (along @ cov[:2, :2] @ along for cov in (whole.cov[0], mixture.cov))
-    assert ours == pytest.approx(theirs, rel=1e-12)
 
 
 def array_of(own):
@@ -285,6 +291,8 @@ def test_a_member_that_is_not_finite_goes_and_the_rest_carry_on():
         ({"nearest_m": 3e4}, "range cells"),
         ({"farthest_m": np.inf}, "range cells"),
         ({"farthest_m": np.nan}, "range cells"),
+        ({"overlap": 0.0}, "overlap"),
+        ({"overlap": np.nan}, "overlap"),
         ({"prune": 1.0}, "prune"),
         ({"prune": -0.1}, "prune"),
         ({"prune": np.nan}, "prune"),

@@ -154,3 +154,5 @@ def test_a_forecast_has_the_moments_of_the_mixture(logs):
         share @ (variances**2 + nus**2) - (share @ nus) ** 2, abs=1e-12
     )
     assert greatest(logs) == max(logs)
+    far = matched([log - 9_000.0 for log in logs], list(nus), list(variances**2))
+    assert far == pytest.approx((nu, variance), abs=1e-9)

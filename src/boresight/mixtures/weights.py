@@ -31,7 +31,7 @@ def reweigh(logs: Sequence[Any], likelihoods: Sequence[Any], prune: float) -> li
         prune: a member whose share is below this is no longer in use; the greatest never goes.
     """
     heard = [select(abs(each) < np.inf, each, GONE) for each in likelihoods]
-    both = [select(log > GONE, log + each, GONE) for log, each in zip(logs, heard, strict=True)]
+    both = [log + each for log, each in zip(logs, heard, strict=True)]
     usable = greatest(both) > 0.5 * GONE
     raw = [select(usable, new, log) for log, new in zip(logs, both, strict=True)]
     top = greatest(raw)
