@@ -191,6 +191,7 @@ def test_at_best_falls_as_own_ship_goes_on():
 
 def test_at_best_is_of_targets_on_the_bearings_whatever_the_bank_believes():
     contact = contact_of(OWN)
+    contact.bearing_rad[:40] = np.nan
     far = OWN[-1] + 10.0 * (TARGET[-1] - OWN[-1])
     astray = np.hstack([far, (far - TARGET[0]) / 800.0])  # began where the target did
     answer = observe(contact, believing([astray], [1.0]), position_sd_m=1e-3)
