@@ -279,7 +279,7 @@ def test_bearings_outside_the_log_are_counted_and_left_out():
 
 
 APART = {
-    "a time zone": (7200.0, "-7200 s (2 hours"),
+    "a time zone": (7200.0, "-7200 s (2 h"),
     "midnight": (-86400.0, "+86400 s (another day)"),
     "an epoch": (1.5e9 - 1.5e9 % 86400, "another epoch"),
     "one from zero": (4000.0, "both begin together"),

@@ -83,7 +83,7 @@ def _shift(time_s: Array, own_s: Array) -> tuple[float, str]:
     days = np.rint(apart / _DAY_S)
     candidates = [
         (_DAY_S * days, "another day" if abs(days) < 1000 else "another epoch"),
-        (_HOUR_S * hours, f"{abs(hours):g} hours, a time zone"),
+        (_HOUR_S * hours, f"{abs(hours):g} h, a time zone"),
         (float(time_s.min() - own_s[0]), "both begin together"),
     ]
     for shift, meaning in candidates:
