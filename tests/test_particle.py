@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 import boresight as bs
 from boresight.filters.particle import _Renewal
@@ -65,6 +66,37 @@ def test_in_a_linear_world_it_agrees_with_the_kalman_filter():
         assert 2.0 < np.sqrt(np.mean(large**2)) / rms < 6.0
     assert abs(np.mean(many[0])) < 0.02
     assert abs(np.mean(many[1])) < 0.02
+
+
+def test_one_plot_weighs_particles_by_the_density_of_its_noise():
+    """By SciPy: a radar whose range and range rate have correlated noise, looking across -x."""
+    radar = bs.Radar(
+        range_m=30.0,
+        azimuth_deg=2.0,
+        range_rate_mps=4.0,
+        range_rate_correlation=0.6,
+        pose=bs.Pose(position_m=np.array([100.0, 50.0, 0.0])),
+    )
+    random = np.random.default_rng(SEED)
+    cloud = np.array([-900.0, 50.0, 5.0, 30.0]) + random.standard_normal((200, 4)) * [30, 40, 5, 5]
+    z = np.array([995.0, np.pi - 0.01, -1.0])
+    found = bs.particle_filter(z[None, None], STILL, radar, 2.0, cloud, seed=SEED, fraction=0.0)
+    moved = cloud.copy()
+    moved[:, :2] += 2.0 * cloud[:, 2:]
+    away = moved[:, :2] - [100.0, 50.0]
+    distance = np.hypot(*away.T)
+    bearing = np.arctan2(away[:, 1], away[:, 0]) % (2.0 * np.pi)  # no jump where these lie
+    rate = np.sum(away * moved[:, 2:], axis=1) / distance
+    cov = np.diag([900.0, np.radians(2.0) ** 2, 16.0])
+    cov[0, 2] = cov[2, 0] = 0.6 * 30.0 * 4.0
+    off = z - np.stack([distance, bearing, rate], axis=1)
+    density = multivariate_normal(np.zeros(3), cov).pdf(off)
+    weights = density / density.sum()
+    assert found.loglik[0, 0] == pytest.approx(np.log(density.mean()), rel=1e-9)
+    assert found.mean[0, 0] == pytest.approx(weights @ moved, rel=1e-9)
+    spread = np.cov(moved.T, aweights=weights, ddof=0)
+    assert found.cov[0, 0] == pytest.approx(spread, rel=1e-6, abs=1e-6)
+    assert found.effective[0, 0] == pytest.approx(1.0 / np.sum(weights**2), rel=1e-9)
 
 
 def test_a_plot_that_is_missing_changes_nothing_but_the_prediction():

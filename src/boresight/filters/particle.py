@@ -57,6 +57,9 @@ def particle_filter(
 ) -> ParticleEstimate:
     """Filter every run with particles of its own.
 
+    How many: on pradeep's bearings, which tell of the range only after minutes, covariances are
+    honest with 5,000 and a fifth too small with 2,000.
+
     Args:
         z: (runs, steps, k) plots, SI units and radians, NaN where missing.
         motion: how the target moves.
