@@ -403,6 +403,14 @@ def test_two_near_bearings_at_one_time_are_averaged():
     assert said(remarks, "averaged")
 
 
+def test_a_true_bearing_goes_before_a_cone_of_its_time():
+    both = pl.concat([heard(conical=False), heard(conical=True)[40:50]])
+    found, remarks = one(both, ship(heading_deg=90.0), sigma_deg=1)
+    assert len(found.time_s) == 101
+    assert not found.is_conical
+    assert said(remarks, "10 cones", "left out")
+
+
 def test_two_far_bearings_at_one_time_may_be_two_contacts():
     again = heard()[50:51].with_columns(pl.col("bearing_deg") + 40)
     with pytest.raises(DataError, match="at one time") as caught:

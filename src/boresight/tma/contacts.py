@@ -152,31 +152,42 @@ def _once(table: "pl.DataFrame", remarks: list[str]) -> "pl.DataFrame":
 
     if table["time_s"].n_unique() == table.height:
         return table
-    rows, same, mixed = [], 0, 0
-    for together in table.partition_by("time_s", maintain_order=True):
-        kept = together.filter(pl.col("bearing").is_not_nan())
-        kept = kept if kept.height else together
-        heard = "bearing" if np.isfinite(kept["bearing"][0]) else "cone"
-        off = wrap(kept[heard].to_numpy() - kept[heard][0])
-        sigma = kept["sigma"].to_numpy()
-        if np.abs(off).max() > _TWO_CONTACTS * np.sqrt(2) * sigma.max():
-            raise _two(kept, np.degrees(np.abs(off).max()))
-        same += together.height - 1 if not off.any() else 0
-        mixed += together.height - 1 if off.any() else 0
-        count = len(off) if off.any() else 1
-        rows.append(
-            kept.head(1).with_columns(
-                pl.col(heard) + float(off.mean()), sigma=pl.lit(float(sigma.mean() / count**0.5))
-            )
-        )
+    is_true = pl.col("bearing").is_not_nan()
+    kept = table.filter(is_true | ~is_true.any().over("time_s"))
+    time_s, sigma = kept["time_s"].to_numpy(), kept["sigma"].to_numpy()
+    starts = np.flatnonzero(np.diff(time_s, prepend=-np.inf))
+    counts = np.diff(starts, append=len(time_s))
+    angle = kept.select(pl.when(is_true).then("bearing").otherwise("cone")).to_series().to_numpy()
+    off = wrap(angle - np.repeat(angle[starts], counts))
+    worst = np.maximum.reduceat(np.abs(off), starts)
+    room = _TWO_CONTACTS * np.sqrt(2) * np.maximum.reduceat(sigma, starts)
+    if (worst > room).any():
+        which = int(np.argmax(worst > room))
+        raise _two(kept[starts[which] : starts[which] + counts[which]], np.degrees(worst[which]))
+    mean = pl.Series(np.add.reduceat(off, starts) / counts)
+    told = np.where(worst > 0, counts, 1)  # the same row again tells nothing new
+    error = pl.Series(np.add.reduceat(sigma, starts) / counts / np.sqrt(told))
+    _tell(
+        table,
+        int((counts - told).sum()),
+        int((told - 1).sum()),
+        table.height - kept.height,
+        remarks,
+    )
+    moved = (pl.col(name) + mean for name in ("bearing", "cone"))
+    return kept[starts].with_columns(*moved, sigma=error)
+
+
+def _tell(table: "pl.DataFrame", same: int, near: int, cones: int, remarks: list[str]) -> None:
+    name = table["track"][0]
     if same:
-        remarks.append(f"{same} bearings of {table['track'][0]} stand twice: taken once.")
-    if mixed:
+        remarks.append(f"{same} bearings of {name} stand twice: taken once.")
+    if near:
         remarks.append(
-            f"{mixed} bearings of {table['track'][0]} are at the time of another, within their "
-            "errors: averaged."
+            f"{near} bearings of {name} are at the time of another, within their errors: averaged."
         )
-    return pl.concat(rows)
+    if cones:
+        remarks.append(f"{cones} cones of {name} are at the time of a true bearing: left out.")
 
 
 def _two(rows: "pl.DataFrame", apart_deg: float) -> DataError:
