@@ -7,6 +7,7 @@ from boresight.errors import UsageError
 from boresight.experiments.bounds import bound_per_trajectory
 from boresight.experiments.simulate import Plots, Truth
 from boresight.filters import fisher
+from boresight.filters.reversible import check_reversible
 from boresight.maths import Gaussian
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Pose, Radar
@@ -214,7 +215,7 @@ def test_refuses_what_it_cannot_do():
     with pytest.raises(UsageError, match="without noise"):
         fisher.fisher_information(args[0], by_step, *args[2:])
     with pytest.raises(UsageError, match="backwards"):
-        fisher.check_reversible(OneWay(), 1.0)
+        check_reversible(OneWay(), 1.0)
 
 
 class OneWay(ConstantVelocity):

@@ -13,7 +13,8 @@ import numpy as np
 
 from boresight.errors import UsageError
 from boresight.filters.batch_problem import Normal, Prior, Problem
-from boresight.filters.fisher import bound, check_reversible
+from boresight.filters.fisher import bound
+from boresight.filters.reversible import check_reversible
 from boresight.lanes import Rate
 from boresight.maths import Gaussian
 from boresight.models.motion import Motion

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boresight.filters.fisher import later
 from boresight.filters.formula import Formula
 from boresight.filters.posterior import innovation
+from boresight.filters.reversible import later
 from boresight.lanes import Leaf, Rate, Scalar, Symmetric, Vector
 from boresight.maths import gradient, jacobian, mirror, missing, select
 from boresight.models.motion import Motion

@@ -62,9 +62,8 @@ def observe(
     # Between two looks it is what it was at the one before.
     latest = np.searchsorted(checked, np.arange(steps), side="right") - 1
     best = sd[np.arange(len(checked)), np.argmax(weights, axis=1)]
-    at_best = min(
-        float(np.min(percent[-1])), float(np.hypot(_at_best(contact, bank), 100.0 * off[-1]))
-    )
+    grid = np.hypot(_at_best(contact, bank), 100.0 * off[-1])
+    at_best = float(min(np.min(percent[-1]), grid))
     never = np.flatnonzero(~told)
     since = 0 if not len(never) else never[-1] + 1
     return Observability(
