@@ -116,17 +116,19 @@ class Problem:
         off = mean - first
         pull = (weight @ off[..., None])[..., 0]
         known = Normal(weight, pull, 0.5 * np.sum(off * pull, axis=-1))
-        return known if self.prior.range_m is None else self._with_range(known, first)
+        if self.prior.range_m is None or self.prior.range_sd_m is None:
+            return known
+        return self._with_range(known, first, self.prior.range_m, self.prior.range_sd_m)
 
-    def _with_range(self, known: Normal, first: Array) -> Normal:
+    def _with_range(self, known: Normal, first: Array, middle: float, sigma: float) -> Normal:
         """The distance that the prior says, as one more residual."""
         d, pose = self.motion.dims, getattr(self.sensor, "pose", None)
         origin = np.zeros(d) if pose is None else pose.position_m.reshape(-1, 3)[0, :d]
-        away, sigma = first[:, :d] - origin, self.prior.range_sd_m
+        away = first[:, :d] - origin
         length = np.maximum(np.sqrt(np.sum(away**2, axis=1)), _FLOOR_M)
         h = np.zeros_like(first)
         h[:, :d] = away / (length * sigma)[:, None]
-        off = (self.prior.range_m - length) / sigma
+        off = (middle - length) / sigma
         return Normal(
             known.information + h[:, :, None] * h[:, None, :],
             known.gradient + h * off[:, None],
