@@ -183,7 +183,7 @@ def test_a_file_of_contacts_is_summed_up():
     marks_and_words = [(each.mark, each.html) for each in summary(made.many(9))]
     assert marks_and_words[0][0] == "attention"
     assert "3 of 9 contacts can be told" in marks_and_words[0][1]
-    assert "while it heard 6 of the others" in marks_and_words[0][1]
+    assert "while it heard 6 of them" in marks_and_words[0][1]
     assert "3 contacts both sides" in marks_and_words[2][1]
 
 

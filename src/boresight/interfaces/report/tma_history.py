@@ -35,7 +35,7 @@ ESTIMATES = (
     "speed is drawn, only what was believed.{lines}"
 )
 LINES = " Upright lines: when the answer was good enough, and dotted when the bound permits it."
-ONE_SIDE = " All of it for a contact to {side}, the likelier side at the end."
+ONE_SIDE = " All of it as if the contact is to {side}."
 SPREADS = (
     "Standard deviations (logarithmic) against the Cramér-Rao bound, dashed, and against what the "
     "criteria allow, dotted: below it a normal error is small enough with {percent:.3g} %."

@@ -31,7 +31,7 @@ CONTACTS = (
 )
 REST = (
     " The first {shown} can be opened below. Any of the others has a page of its own if the "
-    "analysis is run for that one, by its name: <code>--track NAME</code>."
+    "analysis is run for that one, by its name: <code>--track=NAME</code>."
 )
 
 

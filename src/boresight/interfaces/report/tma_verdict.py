@@ -243,7 +243,7 @@ def summary(result: "TmaResult") -> list[Sentence]:
             "good" if told == len(every) else "attention",
             f"<b>The range of {told} of {len(every)} contacts can be told.</b> "
             + (
-                f"Own ship did not manoeuvre while it heard {still} of the others: no method "
+                f"Own ship did not manoeuvre while it heard {still} of them: no method "
                 "could tell their range from bearings alone."
                 if still
                 else ""
