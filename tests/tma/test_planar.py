@@ -110,8 +110,7 @@ def test_scattered_points_leave_no_gap_along_either_axis():
     assert gaps.max() < 4.0 * 12.0 / 96.0
 
 
-def test_a_spot_on_the_origin_is_finite():
-    axes = Axes(*np.zeros((2, 1)), np.ones(1), np.ones(1), np.zeros(1))
-    radius, angle = spots(axes, np.zeros((1, 2)))
-    assert radius[0, 0] == 0.0
-    assert np.isfinite(angle).all()
+def test_points_lie_along_the_axes():
+    x, y = spots(axes_of((3.0, 0.0), 5.0, 2.0), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, -2.0]]))
+    assert x[0] == pytest.approx([3.0, 8.0, 3.0])
+    assert y[0] == pytest.approx([0.0, 0.0, -4.0])

@@ -43,7 +43,7 @@ def own_axes(mean: Array, cov: Array) -> Axes:
 
 
 def spots(axes: Axes, points: Array) -> tuple[Array, Array]:
-    """Radius and angle (rad, to within a turn) of points of each Gaussian, each (..., points).
+    """Points of each Gaussian along its own axes, x and y, each (..., points).
 
     Args:
         axes: each (...).
@@ -51,7 +51,7 @@ def spots(axes: Axes, points: Array) -> tuple[Array, Array]:
     """
     x = axes.along[..., None] + axes.long[..., None] * points[:, 0]
     y = axes.across[..., None] + axes.short[..., None] * points[:, 1]
-    return np.hypot(x, y), axes.turn[..., None] + np.arctan2(y, x)
+    return x, y
 
 
 @cache

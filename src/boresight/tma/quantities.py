@@ -7,14 +7,14 @@ truth of no target. Polar columns everywhere: range (m), bearing, course (degree
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from boresight.maths import wrap
 from boresight.mixtures.bank import Bank
 from boresight.tma.contact import Contact
-from boresight.tma.planar import Axes, own_axes, quadrature, spots
+from boresight.tma.moments import Cells, cell_moments, mixed, mixture_moments, planes, polar_moments
+from boresight.tma.planar import Axes
 from boresight.tma.regions import angle_regions, normal_ends, radius_regions
 from boresight.tma.result import Quantity, Side
 
@@ -48,25 +48,6 @@ def as_polar(states: Array, position: Array) -> Array:
     return np.stack([np.hypot(*_xy(x)), bearing, course, np.hypot(*_xy(v))], axis=-1)
 
 
-def polar_moments(
-    weights: Array, means: Array, covs: Array, position: Array
-) -> tuple[Array, Array]:
-    """Mean and standard deviation of range, bearing, course and speed under a mixture.
-
-    Args:
-        weights: (..., cells), summing to one; a cell without weight may hold anything.
-        means: (..., cells, n), North, East (m), their rates (m/s), and whatever follows.
-        covs: (..., cells, n, n).
-        position: (..., 2), own ship's North and East, m.
-
-    Returns:
-        Two of (..., 4) polar columns. Angles' means are circular, from 0 to 360, their spreads are
-        of what is left, wrapped.
-    """
-    weights = np.asarray(weights, dtype=float)
-    return _mixture(weights, _cell_moments(weights, means, covs, position))
-
-
 def regions(weights: Array, means: Array, covs: Array, position: Array) -> dict[str, Any]:
     """Credible regions of one mixture: by quantity, then by level in per cent.
 
@@ -77,7 +58,7 @@ def regions(weights: Array, means: Array, covs: Array, position: Array) -> dict[
         position: (2,).
     """
     alive = weights > NEGLIGIBLE
-    axes = _planes(means[alive], covs[alive], np.asarray(position)[None])
+    axes = planes(means[alive], covs[alive], np.asarray(position)[None])
     place, velocity = (Axes(*(each[:, i] for each in axes)) for i in (0, 1))
     w = weights[alive]
     return {
@@ -131,8 +112,8 @@ def history(bank: Bank, contact: Contact) -> dict[str, Array]:
         bearings).
     """
     weights, probability = _heavier_side(bank)
-    cells = _cell_moments(weights, bank.means, bank.covs, contact.position_m)
-    estimate, sd = _mixture(weights, cells)
+    cells = cell_moments(weights, bank.means, bank.covs, contact.position_m)
+    estimate, sd = mixture_moments(weights, cells)
     inside = weights[..., None] > 0.0
     place = np.sum(weights[..., None] * np.where(inside, bank.means, 0.0), axis=1)
     low, high = _range_ends(weights, cells, contact.time_s)
@@ -149,66 +130,6 @@ def history(bank: Bank, contact: Contact) -> dict[str, Array]:
         "nis": nu * nu / variance,
         "side_probability": probability,
     }
-
-
-def _planes(means: Array, covs: Array, position: Array) -> Axes:
-    """Own axes, each (N, 2), of the position relative to own ship and of the velocity."""
-    pairs = np.stack([means[:, :2] - position, means[:, 2:4]], axis=1)
-    blocks = np.stack([covs[:, :2, :2], covs[:, 2:4, 2:4]], axis=1)
-    return own_axes(pairs, blocks)
-
-
-class _Cells(NamedTuple):
-    """Mean and variance of radius and angle, of position and velocity; each (..., cells, 2)."""
-
-    radius: Array
-    radius_var: Array
-    angle: Array
-    angle_var: Array
-
-
-def _cell_moments(weights: Array, means: Array, covs: Array, position: Array) -> _Cells:
-    """Moments of each cell by itself; zeros for cells without weight."""
-    alive = weights > 0.0
-    here = np.broadcast_to(np.asarray(position)[..., None, :], (*alive.shape, 2))[alive]
-    axes = _planes(np.asarray(means)[alive], np.asarray(covs)[alive], here)
-    points, w = quadrature()
-    radius, angle = spots(axes, points)
-    centre = axes.turn + np.arctan2(axes.across, axes.along)
-    off = wrap(angle - centre[..., None])
-    middle, aside = radius @ w, off @ w
-    found = (
-        middle,
-        (radius - middle[..., None]) ** 2 @ w,
-        centre + aside,
-        (off - aside[..., None]) ** 2 @ w,
-    )
-    parts = [np.zeros((*alive.shape, 2)) for _ in found]
-    for part, value in zip(parts, found, strict=True):
-        part[alive] = value
-    return _Cells(*parts)
-
-
-def _mixture(weights: Array, cells: _Cells) -> tuple[Array, Array]:
-    """Mean and standard deviation of mixtures, polar columns (..., 4); as in `polar_moments`."""
-    w, angle = weights[..., None], cells.angle
-    middle, spread = _mixed(w, cells.radius, cells.radius_var)
-    pull = w * np.exp(-cells.angle_var / 2.0)  # a direction that is not known has no say
-    centre = np.arctan2(np.sum(pull * np.sin(angle), -2), np.sum(pull * np.cos(angle), -2))
-    off, width = _mixed(w, wrap(angle - centre[..., None, :]), cells.angle_var)
-    return _columns(middle, np.degrees(centre + off) % 360.0), _columns(spread, np.degrees(width))
-
-
-def _mixed(w: Array, means: Array, variances: Array) -> tuple[Array, Array]:
-    """Mean and standard deviation of mixtures over the axis before the last."""
-    mean = np.sum(w * means, axis=-2)
-    apart = means - mean[..., None, :]
-    return mean, np.sqrt(np.sum(w * (variances + apart * apart), axis=-2))
-
-
-def _columns(radius: Array, angle: Array) -> Array:
-    """Polar columns of (..., 2) radii and angles of position and velocity."""
-    return np.stack([radius[..., 0], angle[..., 0], angle[..., 1], radius[..., 1]], axis=-1)
 
 
 def _moments(weights: Array, means: Array, covs: Array) -> tuple[Array, Array]:
@@ -251,7 +172,7 @@ def _heavier_side(bank: Bank) -> tuple[Array, Array]:
     return kept / share[:, None], share
 
 
-def _range_ends(weights: Array, cells: _Cells, time_s: Array) -> tuple[Array, Array]:
+def _range_ends(weights: Array, cells: Cells, time_s: Array) -> tuple[Array, Array]:
     """(steps,) ends of the 90 % region of the range, at some times and straight between."""
     some = np.unique(np.linspace(0, len(time_s) - 1, _DRAWN).astype(int))
     middle, sd = cells.radius[some, :, 0], np.sqrt(cells.radius_var[some, :, 0])
@@ -270,7 +191,7 @@ def _forecast(weights: Array, bank: Bank) -> tuple[Array, Array]:
     share = np.where(used, before, 0.0)
     total = share.sum(axis=1)
     share /= np.where(total > 0.0, total, np.nan)[:, None]
-    nu, sd = _mixed(share, np.where(used, bank.innovation, 0.0), np.where(used, bank.variance, 0.0))
+    nu, sd = mixed(share, np.where(used, bank.innovation, 0.0), np.where(used, bank.variance, 0.0))
     first = np.argmax(np.isfinite(nu), axis=-1)[:, None]
     chosen = (np.take_along_axis(each, first, axis=-1)[:, 0] for each in (nu, sd))
     return next(chosen), next(chosen) ** 2

@@ -13,7 +13,9 @@ from boresight.tma.planar import Axes, angle_density, radius_probability, scatte
 from boresight.tma.result import LEVELS, Region
 
 Array = Any
-_POINTS = 96  # of each cell, for the grid
+_POINTS = 224  # of a cell with all the weight, for the grid
+_FEWEST = 24  # of any cell
+_EVEN = 120  # beside them, over all
 _ALONG = np.linspace(-5.0, 5.0, 31)  # standard deviations, of a normal distribution's grid
 _FINEST = 1e-7  # of the grid's width
 _ROUNDS = 30  # of halving, for a density that parts what is in from what is out
@@ -27,7 +29,8 @@ def radius_regions(weights: Array, axes: Axes, levels: Sequence[int] = LEVELS) -
         axes: of each cell, (cells,).
         levels: per cent.
     """
-    edges = _grid(spots(axes, scattered(_POINTS))[0])
+    radii, _ = _points(weights, axes)
+    edges = _grid(np.append(radii, np.linspace(0.0, radii.max(), _EVEN)))
     inside = weights @ radius_probability(edges, axes)
     density = np.maximum(np.diff(inside), 0.0) / np.diff(edges)
     middles = (edges[:-1] + edges[1:]) / 2.0
@@ -43,13 +46,13 @@ def angle_regions(weights: Array, axes: Axes, levels: Sequence[int] = LEVELS) ->
         levels: per cent.
     """
     turn = 2.0 * np.pi
-    angles = np.append(spots(axes, scattered(_POINTS))[1].ravel(), np.linspace(0.0, turn, 180))
-    grid = _grid(angles % turn)
+    _, angles = _points(weights, axes)
+    grid = _grid(np.append(angles % turn, np.linspace(0.0, turn, _EVEN)))
     density = weights @ angle_density(grid, axes)
-    # The circle is cut where least is, and the cut's ends are one point.
+    # The circle is cut where least is; its first point and its last are one.
     cut = int(np.argmin(density))
-    grid = np.concatenate([grid[cut:], grid[: cut + 1] + turn])
-    density = np.concatenate([density[cut:], density[: cut + 1]])
+    grid = np.concatenate([grid[cut:], grid[1 : cut + 1] + turn])
+    density = np.concatenate([density[cut:], density[1 : cut + 1]])
     found = highest_density(grid, density, levels)
     return _named(levels, [_joined(np.degrees(each)) for each in found])
 
@@ -152,6 +155,13 @@ def _crossing(grid: Array, density: Array, floor: Any, at: Array, side: int) -> 
     fall = here - there
     share = np.where(fall > 0.0, (here - floor) / np.where(fall > 0.0, fall, 1.0), 0.0)
     return start + share * (end - start)
+
+
+def _points(weights: Array, axes: Axes) -> tuple[Array, Array]:
+    """Radii and angles of points of all cells: of each as many as it has weight, and some more."""
+    x, y = spots(axes, scattered(_POINTS))
+    used = np.arange(_POINTS) < _FEWEST + (_POINTS - _FEWEST) * weights[:, None]
+    return np.hypot(x, y)[used], (axes.turn[:, None] + np.arctan2(y, x))[used]
 
 
 def _grid(points: Array) -> Array:
