@@ -51,7 +51,7 @@ def _tracks(study: Study, label: str) -> tuple[Any, dict[str, Array]]:
         label: one.estimate.mean[run, :, :2],
     }
     figure, axes = sheet(
-        1, 2, f"{label}: the run that converges at {one.converged[run]:.0f} s", (6.2, 3.3)
+        1, 2, f"{label}: the run that converges at {one.converged[run]:.0f} s", (6.2, 3.6)
     )
     early = study.at(_EARLY_S)
     for place, last in ((axes[0, 0], len(seconds) - 1), (axes[0, 1], early)):
@@ -102,17 +102,17 @@ def _error(study: Study, quantity: str) -> tuple[Any, dict[str, Array]]:
     """Figures 3 to 6: one run with the limit, and the root mean square with the bound."""
     i, unit = list(QUANTITIES).index(quantity), QUANTITIES[quantity]
     figure, axes = sheet(1, 2, f"Error of the {quantity}, {unit}", (5.2, 3.8))
-    limit, columns = _limit(study, i), {"time_s": study.time_s}
+    limit, columns, plain = _limit(study, i), {"time_s": study.time_s}, unit.replace("°", "deg")
     for label in ("RP", "MGEKF"):
         one = study.tracked[label]
         run = _median_run(one)
         lines = (one.error[run, :, i], rms(one.error[..., i]))
         for place, line in zip(axes[0], lines, strict=True):
             place.plot(study.time_s, line, color=_INK[label], linewidth=1.1, label=label)
-        columns |= {f"{label} run {run}": lines[0], f"{label} RMS": lines[1]}
+        columns |= {f"{label} run {run} {plain}": lines[0], f"{label} RMS {plain}": lines[1]}
     for side in (limit, -limit):
         axes[0, 0].plot(study.time_s, side, "k:", linewidth=0.8)
-    axes[0, 0].set(ylim=(-4 * limit.max(), 4 * limit.max()), title="one run; dotted: tolerated")
+    axes[0, 0].set(ylim=(-3 * limit.max(), 3 * limit.max()), title="one run; dotted: tolerated")
     bound = study.bound_sd[:, i]
     axes[0, 1].plot(study.time_s, bound, "k--", linewidth=1.0, label="Cramér-Rao bound")
     axes[0, 1].set(yscale="log", title=f"root mean square of {study.runs} runs")
@@ -122,7 +122,7 @@ def _error(study: Study, quantity: str) -> tuple[Any, dict[str, Array]]:
         place.title.set_fontsize("small")
         place.grid(alpha=0.3)
         place.legend(fontsize="small")
-    return figure, columns | {"bound": bound, "limit": limit}
+    return figure, columns | {f"bound {plain}": bound, f"limit {plain}": limit}
 
 
 def _limit(study: Study, i: int) -> Array:
