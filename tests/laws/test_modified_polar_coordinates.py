@@ -109,16 +109,16 @@ def test_while_own_ship_sails_on_bearings_know_nothing_of_the_range(seed):
     assert abs(state["mean"][3] / other["mean"][3] - 1.0) > 0.1
 
 
-def test_a_wide_start_has_the_moments_of_lognormal_ranges():
+def test_a_wide_start_has_the_moments_of_uniform_ranges():
     """400,000 draws; their own errors are under a fifth of what is allowed."""
-    rng, c = np.random.default_rng(4), 0.5
+    rng, n = np.random.default_rng(4), 400_000
     method, sensor = ModifiedPolar(), heard_from((0.0, 0.0), (3.0, -7.0))
-    start = Gaussian(np.array([8e3, 0.0, 5.0, 9.0]), np.diag([8e3 * c, 8.0, 11.0, 11.0]) ** 2)
+    spread = 19e3 / np.sqrt(12.0)
+    start = Gaussian(np.array([10.5e3, 0.0, 5.0, 9.0]), np.diag([spread, 10.5, 11.0, 11.0]) ** 2)
     state = method.begin(start, STRAIGHT, sensor)
-    spread = np.sqrt(np.log1p(c * c))
-    r = 8e3 * np.exp(spread * rng.normal(size=400_000) - spread**2 / 2)
-    v = start.mean[2:] - [3.0, -7.0] + 11.0 * rng.normal(size=(len(r), 2))
-    drawn = np.stack([v[:, 1] / r, v[:, 0] / r, 1e-3 * rng.normal(size=len(r)), 1.0 / r])
+    r = rng.uniform(1e3, 20e3, n)
+    v = start.mean[2:] - [3.0, -7.0] + 11.0 * rng.normal(size=(n, 2))
+    drawn = np.stack([v[:, 1] / r, v[:, 0] / r, 1e-3 * rng.normal(size=n), 1.0 / r])
     scale = np.std(drawn, axis=1)
     np.testing.assert_allclose(state["mean"] / scale, drawn.mean(axis=1) / scale, atol=0.02)
     expected = np.cov(drawn) / np.outer(scale, scale)
@@ -152,7 +152,7 @@ def test_a_close_pass_leaves_numbers():
         found = bs.run(name, PLANE, heard_from((0.0, 0.0)), z, dt=1.0, speed_mps=11.0)
         assert np.isfinite(found.mean).all()
         assert np.isfinite(found.cov).all()
-        assert (np.linalg.norm(found.mean[..., :2], axis=-1) < 1.01e6).all()
+        assert (np.linalg.norm(found.mean[..., :2], axis=-1) < 2.01e5).all()
 
 
 def test_no_time_is_no_change():
