@@ -17,6 +17,7 @@ from boresight.maths import Gaussian
 from boresight.maths.mixing import moments
 from boresight.mixtures.bank import run_bank
 from boresight.mixtures.range_parameterised import RangeParameterised, range_cells, starts
+from boresight.mixtures.weights import weights_over_time
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import ConicalBearings, Pose, Radar
 from mixtures.heard import (
@@ -36,6 +37,7 @@ from oracles import pradeep as paper
 
 STEPS = 300
 MEMBERS = ("ekf", "iekf", "mgekf", "ukf", "ckf")
+FORESEEN = ("loglik", "innovation", "variance")
 BEAM = np.radians(1.0)  # of a cone
 
 
@@ -56,6 +58,14 @@ def compared(bank, sensor, z, start):
     begun = pack_states(begun.slots, values)
     fused = run_recursion(recursion, z[None], dt, begun, outputs=outputs)
     return apart, {name: fused.others[name][0] for name in outputs}
+
+
+def foreseen(before, loglik, innovation, variance):
+    """What a mixture foresaw, with the weights (steps, cells) before each bearing."""
+    said = np.log(np.sum(before * np.exp(loglik), axis=-1))
+    nu = np.einsum("sc,sck->sk", before, innovation)
+    spread = variance + (innovation - nu[:, None]) ** 2
+    return said, nu, np.einsum("sc,sck->sk", before, spread)
 
 
 def mixed(bank):
@@ -139,12 +149,9 @@ def test_weights_afterwards_are_weights_step_by_step(member, prune):
     agree(apart, fused)
     assert (np.min(apart.weights[-1]) == 0.0) == (prune > 0.0)
     before = np.concatenate([np.full((1, 6), 1 / 6), apart.weights[:-1]])
-    said = np.log(np.sum(before * np.exp(apart.loglik), axis=-1))
-    np.testing.assert_allclose(fused["loglik"], said, atol=1e-9)
     heard = np.isfinite(z[0])
-    nu = np.einsum("sc,sck->sk", before, apart.innovation)
-    spread = apart.variance + (apart.innovation - nu[:, None]) ** 2
-    variance = np.einsum("sc,sck->sk", before, spread)
+    said, nu, variance = foreseen(before, apart.loglik, apart.innovation, apart.variance)
+    np.testing.assert_allclose(fused["loglik"], said, atol=1e-9)
     np.testing.assert_allclose(fused["innovation"][heard], nu[heard], atol=1e-12)
     np.testing.assert_allclose(fused["variance"][heard], variance[heard], rtol=1e-9)
     assert np.all(np.isnan(fused["variance"][~heard]))
@@ -248,8 +255,7 @@ def test_a_cone_keeps_both_sides_until_own_ship_turns(member, side):
     assert kept[-1].sum() > 0.999
 
 
-def test_a_member_that_is_not_finite_goes_and_the_rest_carry_on():
-    """An infinite covariance in a cell; the told mean is that of the other cells."""
+def test_a_member_that_is_not_finite_goes_as_if_it_had_never_been():
     z = paper.measured(RELATIVE, 1, seed=8)[:, :STEPS, None]
     sensor, motion, dt = bearings_from(OWN[:STEPS]), straight(), every_second(STEPS)
     bank = RangeParameterised(prune=0.0)
@@ -257,27 +263,41 @@ def test_a_member_that_is_not_finite_goes_and_the_rest_carry_on():
     start = earth_fixed(*(part[0] for part in start_of(z[..., 0])), OWN)
     begun = recursion.states(start, 1)
     values = {slot.name: begun[slot.name].copy() for slot in begun.slots}
-    expected = run_recursion(recursion, z, dt, begun, outputs=("kept_log_weights", "mean"))
     values["cov_1"][:] = np.nan
-    ruined = run_recursion(
-        recursion,
-        z,
-        dt,
-        pack_states(begun.slots, values),
-        outputs=("mean", "cov", "loglik", "status", "kept_log_weights"),
-    )
-    share = np.exp(ruined.kept_log_weights[0])
-    assert np.all(share[:, 1] == 0.0)
-    for name in ("mean", "cov", "loglik"):
-        assert np.all(np.isfinite(ruined.others[name]))
+    outputs = ("mean", "cov", "status", "kept_log_weights", *FORESEEN)
+    ruined = run_recursion(recursion, z, dt, pack_states(begun.slots, values), outputs=outputs)
     assert not np.any(ruined.status)
-    kept = np.exp(expected.kept_log_weights[0])
-    kept[:, 1] = 0.0
-    np.testing.assert_allclose(
-        share / share.sum(axis=-1, keepdims=True),
-        kept / kept.sum(axis=-1, keepdims=True),
-        atol=1e-9,
-    )
+    share = np.exp(ruined.kept_log_weights[0])
+    share /= share.sum(axis=-1, keepdims=True)
+    rest = [0, 2, 3, 4, 5]
+    apart = run_bank(bank, motion, sensor, z, dt, start)
+    kept = weights_over_time(apart.loglik[:, rest], prune=0.0)
+    assert np.all(share[:, 1] == 0.0)
+    np.testing.assert_allclose(share[:, rest], kept, atol=1e-9)
+    before = np.concatenate([np.full((1, 5), 0.2), kept[:-1]])
+    for found, expected in zip(
+        (ruined.others[name][0] for name in FORESEEN),
+        foreseen(before, *(getattr(apart, name)[:, rest] for name in FORESEEN)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-9)
+    mean, cov = paper.mixture(kept, apart.means[:, rest], apart.covs[:, rest])
+    np.testing.assert_allclose(ruined.mean[0], mean, atol=1e-9 * np.max(np.abs(mean)))
+    np.testing.assert_allclose(ruined.cov[0], cov, atol=1e-9 * np.max(np.abs(cov)))
+
+
+@pytest.mark.parametrize("member", [*MEMBERS, "modified-polar"])
+def test_a_cell_is_the_filter_of_its_name(member):
+    z = paper.measured(RELATIVE, 1, seed=9)[:, :STEPS]
+    start = earth_fixed(*(part[0] for part in start_of(z)), OWN)
+    motion, sensor = straight(), bearings_from(OWN[:STEPS])
+    bank = RangeParameterised(member=member, cells=1)
+    one = run_bank(bank, motion, sensor, z[..., None], every_second(STEPS), start)
+    (cell,), _ = starts(bank, start, motion, sensor)
+    alone = filtered(member, z, OWN[:STEPS], cell, outputs=("mean", "cov"))
+    scale = np.max(np.abs(alone.cov), axis=(1, 2, 3))
+    np.testing.assert_allclose(one.means[:, 0], alone.mean[0], rtol=1e-9, atol=1e-9)
+    assert np.max(np.abs(one.covs[:, 0] - alone.cov[0]) / scale) < 1e-12
 
 
 @pytest.mark.parametrize(
