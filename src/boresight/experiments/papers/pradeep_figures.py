@@ -219,7 +219,7 @@ def _weights(study: Study) -> tuple[Any, dict[str, Array]]:
 
 
 def _shade(i: int, cells: int) -> str:
-    """Near cells dark, far ones light."""
+    """A colour for each cell; greys where colours run out."""
     return f"C{i}" if cells <= 10 else f"{i / cells:.2f}"
 
 
