@@ -34,6 +34,7 @@ _WHERE = {
     "models.sensors": ["Bearings", "ConicalBearings", "Pose", "Radar"],
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
     "catalogue": ["cite"],
+    "tma.result": ["Criteria"],
     "filters.own_doppler": ["track_range_rate"],
     "filters.particle": ["bearing_particles", "particle_filter"],
     "experiments.scenario": ["Scenario"],
@@ -44,6 +45,7 @@ _WHERE = {
     "interfaces.error_models": ["error_model"],
     "calibration.correcting": ["correct"],
     "interfaces.calibration": ["calibrate", "read_calibration", "write_calibration"],
+    "interfaces.contacts": ["tma"],
     "interfaces.reading": ["read"],
     "interfaces.python": ["inspect", "report", "run", "smooth", "stream", "track"],
 }

@@ -16,6 +16,7 @@ from boresight.filters.particle import particle_filter as particle_filter
 from boresight.interfaces.calibration import calibrate as calibrate
 from boresight.interfaces.calibration import read_calibration as read_calibration
 from boresight.interfaces.calibration import write_calibration as write_calibration
+from boresight.interfaces.contacts import tma as tma
 from boresight.interfaces.converting import convert as convert
 from boresight.interfaces.error_models import error_model as error_model
 from boresight.interfaces.python import inspect as inspect
@@ -46,3 +47,4 @@ from boresight.models.sensors import Pose as Pose
 from boresight.models.sensors import Radar as Radar
 
 __version__: str
+from boresight.tma.result import Criteria as Criteria

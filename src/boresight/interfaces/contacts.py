@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
-from boresight.errors import UsageError
+from boresight.errors import UsageError, unknown
 from boresight.tma.result import Criteria, TmaResult
 
 if TYPE_CHECKING:
@@ -13,8 +13,53 @@ if TYPE_CHECKING:
 
     from boresight.filters.method import Filter
 
-Table = "pl.DataFrame | str | PathLike[str]"
 FILTER = "rp-ekf"
+OF_THE_BANK = ("cells", "nearest_m", "farthest_m", "prune")
+OF_THE_BELIEF = ("nearest_m", "farthest_m", "speed_mps", "accel_mps2", "position_sd_m")
+
+
+class Asked(TypedDict, total=False):
+    """What may be said beside the tables.
+
+    Attributes:
+        criteria: when the answer is good enough.
+        cells: how many range cells a bank has.
+        nearest_m, farthest_m: between which ranges the contact is believed to be, m.
+        prune: share of the weight below which a cell goes.
+        speed_mps: what is believed of its velocity: standard deviation of each component.
+        track: one contact of a file with several; left out, all of them.
+        sigma_deg: standard deviation of a bearing, where the file does not tell; left out, it is
+            estimated from the scatter.
+        degrees: affirms that bearings which look like radians are degrees.
+        declination_deg: makes magnetic bearings true, east positive.
+        own_ship_clock_s: added to own ship's times.
+        tow_m: how far astern of own ship the array is towed, along its path.
+        array_spacing_m: between the hydrophones of a table of time differences (tdoa_s).
+        sound_speed_mps: for the same; left out, what the file says, or 1500.
+        accel_mps2: how unsteadily the contact may move: standard deviation of its acceleration; 0
+            for a steady course and speed.
+        position_sd_m: how well own ship's track is known: what wanders by that is no manoeuvre.
+        columns, own_ship_columns: our names to the file's.
+    """
+
+    criteria: Criteria | None
+    cells: int | None
+    nearest_m: float | None
+    farthest_m: float | None
+    prune: float | None
+    speed_mps: float | None
+    accel_mps2: float | None
+    position_sd_m: float | None
+    track: str | None
+    sigma_deg: float | None
+    degrees: bool
+    declination_deg: float | None
+    own_ship_clock_s: float
+    tow_m: float
+    array_spacing_m: float | None
+    sound_speed_mps: float | None
+    columns: Mapping[str, str] | None
+    own_ship_columns: Mapping[str, str] | None
 
 
 def tma(
@@ -22,22 +67,7 @@ def tma(
     own_ship: "pl.DataFrame | str | PathLike[str]",
     *,
     filter: str = FILTER,  # noqa: A002 - the field's word
-    criteria: Criteria | None = None,
-    cells: int | None = None,
-    nearest_m: float | None = None,
-    farthest_m: float | None = None,
-    prune: float | None = None,
-    speed_mps: float | None = None,
-    track: str | None = None,
-    sigma_deg: float | None = None,
-    degrees: bool = False,
-    declination_deg: float | None = None,
-    own_ship_clock_s: float = 0.0,
-    tow_m: float = 0.0,
-    array_spacing_m: float | None = None,
-    sound_speed_mps: float = 1500.0,
-    columns: Mapping[str, str] | None = None,
-    own_ship_columns: Mapping[str, str] | None = None,
+    **asked: Unpack[Asked],
 ) -> TmaResult:
     """From bearings and own ship's track to range, course and speed, and how sure that is.
 
@@ -48,23 +78,9 @@ def tma(
             and, if it has them, course_deg, speed_mps, heading_deg.
         filter: of the catalogue: a bank (rp-ekf, rp-mgekf, rp-ukf, rp-ckf, rp-modified-polar), or
             a single filter (ekf, mgekf, modified-polar, ukf, ...).
-        criteria: when the answer is good enough.
-        cells: how many range cells.
-        nearest_m: smallest range that is believed possible, m.
-        farthest_m: greatest range that is believed possible, m.
-        prune: share of the weight below which a cell goes.
-        speed_mps: what is believed of the contact's velocity: standard deviation of each component.
-        track: one contact of a file with several; left out, all of them.
-        sigma_deg: standard deviation of a bearing, where the file does not tell; left out, it is
-            estimated from the bearings' scatter.
-        degrees: affirms that bearings which look like radians are degrees.
-        declination_deg: makes magnetic bearings true, east positive.
-        own_ship_clock_s: added to own ship's times.
-        tow_m: how far astern of own ship the array is towed, along its path.
-        array_spacing_m: between the two hydrophones of a table of time differences.
-        sound_speed_mps: for the same.
-        columns: of the bearings: our names to the file's.
-        own_ship_columns: the same of own ship's.
+        asked: see `Asked`: criteria, cells, nearest_m, farthest_m, prune, speed_mps, accel_mps2,
+            position_sd_m, track, sigma_deg, degrees, declination_deg, own_ship_clock_s, tow_m,
+            array_spacing_m, sound_speed_mps, columns, own_ship_columns.
 
     Returns:
         The answers, the contact with most bearings first; `report` makes a page of them.
@@ -76,56 +92,53 @@ def tma(
     from boresight.tma.analyse import Belief, analyse
     from boresight.tma.contacts import contacts
 
-    chosen = chosen_filter(
-        filter, cells=cells, nearest_m=nearest_m, farthest_m=farthest_m, prune=prune
-    )
-    believed = {"nearest_m": nearest_m, "farthest_m": farthest_m, "speed_mps": speed_mps}
-    belief = Belief(**{name: value for name, value in believed.items() if value is not None})
-    heard, heard_remarks = _bearings(bearings, columns)
-    sailed, own_remarks = _own_ship(own_ship, own_ship_columns)
-    found, remarks = contacts(
-        heard,
-        sailed,
-        name=_name(bearings),
-        sigma_deg=sigma_deg,
-        degrees=degrees,
-        declination_deg=declination_deg,
-        own_ship_clock_s=own_ship_clock_s,
-        tow_m=tow_m,
-        array_spacing_m=array_spacing_m,
-        sound_speed_mps=sound_speed_mps,
-        track=track,
-    )
-    limits = criteria or Criteria()
-    answers = tuple(analyse(each, chosen, belief=belief, criteria=limits) for each in found)
+    given: dict[str, Any] = {key: value for key, value in asked.items() if value is not None}
+    for name in given:
+        if name not in Asked.__annotations__:
+            raise unknown("setting", name, Asked.__annotations__)
+    chosen = chosen_filter(filter, **_some(given, OF_THE_BANK))
+    belief = Belief(**_some(given, OF_THE_BELIEF))
+    criteria = given.pop("criteria", Criteria())
+    affirmed = given.get("degrees", False)
+    heard, heard_remarks = _bearings(bearings, given.pop("columns", None), degrees=affirmed)
+    sailed, own_remarks = _own_ship(own_ship, given.pop("own_ship_columns", None))
+    rest = {key: each for key, each in given.items() if key not in OF_THE_BANK + OF_THE_BELIEF}
+    found, remarks = contacts(heard, sailed, name=_name(bearings), **rest)
+    answers = tuple(analyse(each, chosen, belief=belief, criteria=criteria) for each in found)
     return TmaResult(contacts=answers, remarks=(*heard_remarks, *own_remarks, *remarks))
+
+
+def _some(given: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    return {name: given[name] for name in names if name in given}
 
 
 def chosen_filter(name: str, **settings: Any) -> "Filter":
     """A filter of the catalogue with the settings that were given; UsageError for one of no use."""
     from boresight import catalogue
 
-    given = {key: value for key, value in settings.items() if value is not None}
     chosen = catalogue.lookup(name)
     if not name.startswith("rp-"):
         for key in ("cells", "prune"):
-            if key in given:
+            if key in settings:
                 raise UsageError(
                     f"{name} has no setting {key}",
                     why="it is a single filter",
                     next_step=f"use rp-{name}, or leave it out",
                 )
         return chosen
-    return chosen.with_settings(**given)
+    return chosen.with_settings(**settings)
 
 
 def _bearings(
-    given: "pl.DataFrame | str | PathLike[str]", columns: Mapping[str, str] | None
+    given: "pl.DataFrame | str | PathLike[str]",
+    columns: Mapping[str, str] | None,
+    *,
+    degrees: bool,
 ) -> "tuple[pl.DataFrame, tuple[str, ...]]":
     from boresight.formats.bearings import read_bearings
 
     if isinstance(given, str | PathLike):
-        return read_bearings(Path(given), columns=columns)
+        return read_bearings(Path(given), columns=columns, degrees=degrees)
     return _frame(given, "bearings"), ()
 
 

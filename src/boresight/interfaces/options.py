@@ -116,7 +116,13 @@ Spacing = Annotated[
     float | None,
     Parameter(help="Metres between two hydrophones, for a table of time differences (tdoa_s)."),
 ]
-SoundSpeed = Annotated[float, Parameter(help="Speed of sound, m/s, for time differences.")]
+SoundSpeed = Annotated[
+    float | None,
+    Parameter(
+        show_default=lambda _: "1500",
+        help="Speed of sound, m/s, for time differences; left out, what the file says.",
+    ),
+]
 Limits = Annotated[
     str | None,
     Parameter(
@@ -127,4 +133,17 @@ Limits = Annotated[
 ]
 OwnShipColumns = Annotated[
     str | None, Parameter(help="The same for own ship's table (latitude_deg=lat,...).")
+]
+Acceleration = Annotated[
+    float,
+    Parameter(
+        help="How unsteadily the contact may move: m/s², a standard deviation; 0 for a steady "
+        "course and speed."
+    ),
+]
+PositionError = Annotated[
+    float,
+    Parameter(
+        help="How well own ship's track is known, m: what wanders by as much is no manoeuvre."
+    ),
 ]

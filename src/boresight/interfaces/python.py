@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from boresight.calibration.result import Calibration
     from boresight.interfaces.report import Report
+    from boresight.tma.result import TmaResult
     from boresight.tracking.result import TrackingResult
 
 Array = Any
@@ -221,25 +222,27 @@ def track(
 
 
 def report(
-    tracks: "TrackingResult | Calibration | None" = None,
+    tracks: "TrackingResult | Calibration | TmaResult | None" = None,
     calibration: "Calibration | None" = None,
     **about: Any,
 ) -> "Report":
     """A report on one page: `.html`, `.save(path)`, and shown by itself in a notebook.
 
     Args:
-        tracks: what `track` gives; or what `calibrate` gives, for a page about that alone.
+        tracks: what `track` gives; or what `calibrate` or `tma` gives, for a page about that alone.
         calibration: what `calibrate` gives, for a page about both.
         about: `inspection`, what `inspect` says of the file, and `command`, as the page shows them.
 
     Raises:
-        UsageError: neither tracks nor a calibration.
+        UsageError: nothing to report on.
     """
     from boresight.calibration.result import Calibration
     from boresight.interfaces.report import report as build
+    from boresight.tma.result import TmaResult
     from boresight.tracking.result import TrackingResult
 
-    for value, kind in ((tracks, TrackingResult | Calibration), (calibration, Calibration)):
+    first = TrackingResult | Calibration | TmaResult
+    for value, kind in ((tracks, first), (calibration, Calibration)):
         if value is not None and not isinstance(value, kind):
             raise UsageError(
                 f"a {type(value).__name__} cannot be reported on",
@@ -247,4 +250,6 @@ def report(
             )
     if isinstance(tracks, Calibration):
         return build(calibration=tracks, **about)
+    if isinstance(tracks, TmaResult):
+        return build(motion=tracks, calibration=calibration, **about)
     return build(tracks, calibration=calibration, **about)

@@ -15,7 +15,7 @@ from boresight.filters.method import Filter
 from boresight.maths import Gaussian
 from boresight.mixtures.bank import Bank, run_bank
 from boresight.mixtures.range_parameterised import SPEED_MPS, RangeParameterised
-from boresight.models.checks import positive
+from boresight.models.checks import not_negative, positive
 from boresight.models.motion import ConstantVelocity
 from boresight.tma.contact import Contact
 from boresight.tma.convergence import check_criteria, converge
@@ -50,15 +50,22 @@ class Belief:
     Attributes:
         nearest_m, farthest_m: between which ranges it is.
         speed_mps: standard deviation of each component of its velocity.
+        accel_mps2: standard deviation of its acceleration; 0 for a steady course and speed, which
+            the bound and the batch estimate take for granted.
+        position_sd_m: how well own ship's track is known; what wanders by it is no manoeuvre.
     """
 
     nearest_m: float = RangeParameterised.nearest_m
     farthest_m: float = RangeParameterised.farthest_m
     speed_mps: float = SPEED_MPS
+    accel_mps2: float = 0.0
+    position_sd_m: float = 5.0
 
     def __post_init__(self) -> None:
         """Numbers are checked."""
         positive("speed_mps", self.speed_mps)
+        not_negative("accel_mps2", self.accel_mps2)
+        positive("position_sd_m", self.position_sd_m)
         RangeParameterised(nearest_m=self.nearest_m, farthest_m=self.farthest_m)
 
     @property
@@ -96,12 +103,12 @@ def analyse(
         )
     spread = method if isinstance(method, RangeParameterised) else belief.spread
     bank = _filtered(contact, method, spread, belief)
-    seen = observe(contact, bank)
+    seen = observe(contact, bank, position_sd_m=belief.position_sd_m)
     answer = describe(bank, contact, observable=seen.observable)
     fit = _fit(contact, bank, spread, belief)
     track = _track(contact, answer.mean if answer.decided else fit.mean[0])
     bound = _bound(contact, track, spread, belief)
-    past = history(bank, contact)
+    past, residuals = history(bank, contact), _judged(contact, fit)
     is_known = _known(contact, seen)
     estimate, sd = (np.stack([past[n] for n in names], axis=-1) for names in (QUANTITIES, _SDS))
     return TargetMotion(
@@ -119,9 +126,9 @@ def analyse(
         history=_table(contact, past, bound, is_known),
         cells=_cells(bank, spread if isinstance(method, RangeParameterised) else None),
         batch=_batch(contact, fit) if fit.converged[0] and seen.observable else None,
-        residuals=_judged(contact, fit),
+        residuals=residuals,
         settings=_settings(chosen, spread, belief),
-        remarks=_doubts(answer.range_m, spread, fit),
+        remarks=_doubts(answer.range_m, spread, residuals),
     )
 
 
@@ -131,7 +138,8 @@ def _filtered(contact: Contact, method: Any, spread: RangeParameterised, belief:
     start = spread.start(z[:, 0], MOTION, contact.sensor, speed_mps=belief.speed_mps)
     z[:, 0] = np.nan
     first = Gaussian(start.mean[0], start.cov[0])
-    return run_bank(method, MOTION, contact.sensor, z, contact.dt, first)
+    motion = ConstantVelocity(accel_mps2=belief.accel_mps2, dims=2)
+    return run_bank(method, motion, contact.sensor, z, contact.dt, first)
 
 
 def _fit(contact: Contact, bank: Bank, spread: RangeParameterised, belief: Belief) -> BatchEstimate:
@@ -231,14 +239,17 @@ def _judged(contact: Contact, fit: BatchEstimate) -> Residuals | None:
 def _settings(chosen: Filter, spread: RangeParameterised, belief: Belief) -> dict[str, Any]:
     """Everything that was chosen."""
     limits = {"nearest_m": spread.nearest_m, "farthest_m": spread.farthest_m}
-    own = {k: v for k, v in asdict(spread).items() if k in ("member", "cells", "prune", "told")}
-    bank = own if chosen.name in BANKS else {}
-    return {"filter": chosen.name, **bank, **limits, "speed_mps": belief.speed_mps}
+    bank = asdict(spread) if chosen.name in BANKS else limits
+    return {"filter": chosen.name, **asdict(belief), **bank}
 
 
-def _doubts(range_m: Quantity, spread: RangeParameterised, fit: BatchEstimate) -> tuple[str, ...]:
-    """What contradicts itself in the answer."""
-    said = []
+def _doubts(
+    range_m: Quantity,
+    spread: RangeParameterised,
+    residuals: Residuals | None,
+) -> tuple[str, ...]:
+    """What contradicts itself in the answer, and what the residuals say against it."""
+    said = [test.words for test in residuals.tests if not test.passed] if residuals else []
     region = range_m.regions.get("90", ())
     if region and (region[-1][1] < spread.nearest_m or region[0][0] > spread.farthest_m):
         said.append(
@@ -247,6 +258,6 @@ def _doubts(range_m: Quantity, spread: RangeParameterised, fit: BatchEstimate) -
             "either these limits are wrong, or the contact does not keep its course and speed "
             "(own ship's own noise, for one, turns with it)."
         )
-    if not fit.converged[0]:
+    if residuals is None:
         said.append("No steady track fits the bearings well enough for a batch estimate to settle.")
     return tuple(said)
