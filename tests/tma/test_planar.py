@@ -49,6 +49,18 @@ def test_a_round_one_has_rices_radius(away, direction):
     assert radius_probability(sd * r, axes)[0] == pytest.approx(expected, abs=1e-6)
 
 
+def test_an_oblique_one_far_away_has_a_normal_radius():
+    """Along the line of sight; across it, curvature adds its part to the mean."""
+    line, away = np.radians(65.0), 1e4
+    axes = axes_of(away * np.array([np.cos(line), np.sin(line)]), 10.0, 5.0)
+    along, across = (
+        np.hypot(10.0 * f(line), 5.0 * g(line)) for f, g in ((np.cos, np.sin), (np.sin, np.cos))
+    )
+    t = np.linspace(-3.0, 3.0, 13)
+    found = radius_probability(away + across**2 / (2.0 * away) + along * t, axes)[0]
+    assert found == pytest.approx(stats.norm.cdf(t), abs=1e-3)
+
+
 def test_a_line_has_a_folded_normal_radius():
     axes = axes_of((50.0, 0.0), 40.0, 1e-3)
     r = np.linspace(0.5, 200.0, 50)

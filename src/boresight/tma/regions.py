@@ -49,12 +49,12 @@ def angle_regions(weights: Array, axes: Axes, levels: Sequence[int] = LEVELS) ->
     _, angles = _points(weights, axes)
     grid = _grid(np.append(angles % turn, np.linspace(0.0, turn, _EVEN)))
     density = weights @ angle_density(grid, axes)
-    # The circle is cut where least is; its first point and its last are one.
+    # The circle is cut where least is, so that no piece lies on both sides of the cut.
     cut = int(np.argmin(density))
     grid = np.concatenate([grid[cut:], grid[1 : cut + 1] + turn])
     density = np.concatenate([density[cut:], density[1 : cut + 1]])
     found = highest_density(grid, density, levels)
-    return _named(levels, [_joined(np.degrees(each)) for each in found])
+    return _named(levels, [_from_north(np.degrees(each)) for each in found])
 
 
 def normal_ends(weights: Array, means: Array, sds: Array, level: int) -> tuple[Array, Array]:
@@ -171,10 +171,8 @@ def _grid(points: Array) -> Array:
     return low + step * np.unique(np.rint((points - low) / step))
 
 
-def _joined(pieces: Array) -> Array:
-    """Pieces on a circle that was cut, degrees: those that meet at the cut are one; from 0 on."""
-    if len(pieces) > 1 and pieces[-1, 1] - pieces[0, 0] >= 360.0 - 1e-9:
-        pieces[0, 0], pieces = pieces[-1, 0] - 360.0, pieces[:-1]
+def _from_north(pieces: Array) -> Array:
+    """Pieces on a circle, degrees, that begin from 0 to 360, in order."""
     pieces = pieces - 360.0 * np.floor(pieces[:, :1] / 360.0)
     return pieces[np.argsort(pieces[:, 0])]
 
