@@ -45,7 +45,7 @@ def compared(bank, sensor, z, start):
     """Both ways, from the same cells to the last bit: an ulp would grow to 1e-12 in 300 steps."""
     motion, dt = straight(0.01), every_second(len(z))
     apart = run_bank(bank, motion, sensor, z[None], dt, start)
-    outputs = ("mean", "cov", "loglik", "innovation", "variance", "kept_log_weights")
+    outputs = ("mean", "cov", "nis", "dof", *FORESEEN, "kept_log_weights")
     recursion = Recursion(bank, motion, sensor)
     begun = recursion.states(start, 1)
     cells, _ = starts(bank, start, motion, sensor)
@@ -155,6 +155,9 @@ def test_weights_afterwards_are_weights_step_by_step(member, prune):
     np.testing.assert_allclose(fused["innovation"][heard], nu[heard], atol=1e-12)
     np.testing.assert_allclose(fused["variance"][heard], variance[heard], rtol=1e-9)
     assert np.all(np.isnan(fused["variance"][~heard]))
+    square = np.where(heard, nu[:, 0] ** 2 / np.where(heard, variance[:, 0], 1.0), 0.0)
+    np.testing.assert_allclose(fused["nis"], square, rtol=1e-8, atol=1e-12)
+    assert np.array_equal(fused["dof"], heard)
 
 
 def test_a_bearing_that_is_missing_moves_cells_but_no_weight():
