@@ -153,7 +153,7 @@ _FILTERS = {
         Filter(
             name="modified-polar",
             formula=ModifiedPolar,
-            summary="extended Kalman filter in modified polar coordinates, for bearings",
+            summary="Kalman filter in modified polar coordinates, for bearings",
             paper="aidala1983",
             predict=None,
         ),
