@@ -331,3 +331,15 @@ def test_a_bank_needs_a_bearing():
         RangeParameterised().start(
             np.ones((1, 1)), ConstantVelocity(accel_mps2=0.0, dims=2), Radar(range_m=3.0)
         )
+
+
+def test_cells_that_overlap_are_as_much_wider_and_begin_in_the_same_places():
+    plain, wide = (RangeParameterised(overlap=o).ranges for o in (1.0, 1.5))
+    assert np.array_equal(wide[0], plain[0])
+    assert np.array_equal(wide[1], 1.5 * plain[1])
+
+
+@pytest.mark.parametrize("overlap", [0.0, -1.0, np.inf, np.nan])
+def test_an_overlap_is_above_zero_and_finite(overlap):
+    with pytest.raises(UsageError, match="overlap"):
+        RangeParameterised(overlap=overlap)
