@@ -44,7 +44,9 @@ class Method(Protocol):
     def plain(self) -> bool:
         """Whether the state is a mean and a cov in the motion's coordinates, told as it is."""
 
-    def start(self, z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float) -> Gaussian:
+    def start(
+        self, z: Array, motion: Motion, sensor: Sensor, *, speed_mps: float = ...
+    ) -> Gaussian:
         """A Gaussian for every lane from its first plot: (lanes, k) to mean (lanes, n)."""
 
     def layout(self, motion: Motion, sensor: Sensor) -> dict[str, Leaf]:

@@ -17,7 +17,6 @@ import numpy as np
 
 from boresight.errors import Status, UsageError
 from boresight.filters.recursion import SUMMARY, Recursion
-from boresight.filters.start import SPEED_MPS
 from boresight.lanes import BLOCK, Kernel, Rate, States, Symmetric
 from boresight.maths import Gaussian
 from boresight.models.checks import as_number
@@ -119,13 +118,14 @@ class Stream:
             self._tail = struct.pack(f"{len(addresses)}q", *addresses)
             self._call = code.call
 
-    def start(self, plot: Array | Gaussian, *, speed_mps: float = SPEED_MPS) -> StreamState:
-        """Begin from a plot (k,) or (targets, k), or from a Gaussian."""
+    def start(self, plot: Array | Gaussian, *, speed_mps: float | None = None) -> StreamState:
+        """Begin from a plot (k,) or (targets, k), or from a Gaussian; see `run` for the speed."""
         recursion, prior = self.recursion, plot
         if not isinstance(plot, Gaussian):
             rows = self._first_rows(plot)
             models = recursion.motion, recursion.sensor
-            prior = recursion.method.start(rows, *models, speed_mps=speed_mps)
+            spread: dict[str, Any] = {} if speed_mps is None else {"speed_mps": speed_mps}
+            prior = recursion.method.start(rows, *models, **spread)
         n = len(recursion.motion.names)
         if np.shape(prior.mean)[-1:] != (n,):
             raise UsageError(

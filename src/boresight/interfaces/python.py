@@ -12,7 +12,7 @@ from boresight import catalogue
 from boresight.errors import UsageError
 from boresight.filters.recursion import Estimate, Recursion, run_recursion
 from boresight.filters.smoother import smooth as smooth_lanes
-from boresight.filters.start import SPEED_MPS, two_plots
+from boresight.filters.start import two_plots
 from boresight.filters.stream import Stream
 from boresight.interfaces import door, given
 from boresight.interfaces.applying import applied
@@ -43,7 +43,7 @@ def run(
     *,
     dt: Array | None = None,
     start: Gaussian | Literal["one plot", "two plots"] | None = None,
-    speed_mps: float = SPEED_MPS,
+    speed_mps: float | None = None,
     outputs: Sequence[str] = ("mean", "cov", "nis"),
     last: bool = False,
     threads: int = 1,
@@ -62,7 +62,8 @@ def run(
         start: Gaussian with mean (n,) or (runs, n); or "one plot" or "two plots": made from the
             first plots, which are then used for the start only (until then every scan shows the
             start). Left out: what `plots` carries, else "one plot".
-        speed_mps: spread of each velocity of a start from one plot.
+        speed_mps: spread of each velocity of a start from one plot; left out, the filter's own: 300
+            for radars' targets, 11 for a bank's contacts at sea.
         outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status.
         last: give outputs after the last scan only.
         threads: threads that share the runs; the result does not depend on it.
@@ -129,7 +130,7 @@ def smooth(
 
 
 def _start_from_plots(
-    how: str, z: Array, dt: Array, recursion: Recursion, speed_mps: float
+    how: str, z: Array, dt: Array, recursion: Recursion, speed_mps: float | None
 ) -> tuple[Gaussian, Array, Array]:
     """A start from the first plots, which are then not used again."""
     used = _STARTS.get(how, 0)
@@ -142,12 +143,12 @@ def _start_from_plots(
             f"no start from {how} of {z.shape[1]} scans",
             next_step="give the start: start=Gaussian(mean, cov)",
         )
-    positive("speed_mps", speed_mps)
+    spread = {} if speed_mps is None else {"speed_mps": positive("speed_mps", speed_mps)}
     rows = np.shape(dt)[0] if np.ndim(dt) else 1
     steps = np.array(np.broadcast_to(np.asarray(dt, dtype=float), (rows, z.shape[1])))
     models = recursion.motion, recursion.sensor
     if used == 1:
-        prior = recursion.method.start(z[:, 0], *models, speed_mps=speed_mps)
+        prior = recursion.method.start(z[:, 0], *models, **spread)
     elif not np.all(steps[:, 1] > 0):
         raise UsageError(
             "no velocity from two plots of one instant", next_step='start from "one plot"'

@@ -30,6 +30,7 @@ from boresight.models.sensors import Radar, Sensor
 Array = Any
 Told = Literal["moments", "best cell"]
 SPEED_MPS = CONTACT_MPS
+FUSED_ON_CONES = 3  # modified polar cells a side: more are more operations than a program has
 
 _MEMBERS: Mapping[str, Any] = {
     "ekf": lambda: Updating(formula=ekf.update),
@@ -133,6 +134,12 @@ class RangeParameterised:
         The angle's uncertainty, the velocity, and further states are the start's; their
         correlations with the position are not.
         """
+        if self.member == "modified-polar" and _is_cone(sensor) and self.cells > FUSED_ON_CONES:
+            raise UsageError(
+                f"{self.cells} cells in modified polar coordinates, on both sides of a cone",
+                why="one compiled step holds no more than three such cells a side",
+                next_step="use cells=3, or rp-ekf; tma runs cells one by one and takes any number",
+            )
         cells, _ = starts(self, start, motion, sensor)
         states = [self.filter.begin(cell, motion, sensor) for cell in cells]
         return self._keep(states, np.zeros(len(cells)))
