@@ -17,7 +17,7 @@ from boresight.maths import Gaussian, gradient
 from boresight.mixtures.weights import weights_over_time
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Bearings
-from boresight.tma.result import Criteria
+from boresight.target_motion.result import Criteria
 from mixtures.heard import (
     CELLS,
     OWN,

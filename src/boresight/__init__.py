@@ -34,7 +34,7 @@ _WHERE = {
     "models.sensors": ["Bearings", "ConicalBearings", "Pose", "Radar"],
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
     "catalogue": ["cite"],
-    "tma.result": ["Criteria"],
+    "target_motion.result": ["Criteria"],
     "filters.own_doppler": ["track_range_rate"],
     "filters.particle": ["bearing_particles", "particle_filter"],
     "experiments.scenario": ["Scenario"],

@@ -47,4 +47,4 @@ from boresight.models.sensors import Pose as Pose
 from boresight.models.sensors import Radar as Radar
 
 __version__: str
-from boresight.tma.result import Criteria as Criteria
+from boresight.target_motion.result import Criteria as Criteria

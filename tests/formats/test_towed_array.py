@@ -8,7 +8,7 @@ from scipy.io import savemat
 from boresight.errors import DataError
 from boresight.formats.bearings import read_bearings
 from boresight.formats.own_ship import read_own_ship
-from boresight.tma.contacts import contacts
+from boresight.target_motion.contacts import contacts
 
 SOUND, SPACING, DAY = 1480.0, 20.0, 736_950.0  # MATLAB's number of 2017-09-12
 SHIP_MPS, STEPS = 5.0, 200

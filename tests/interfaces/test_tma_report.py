@@ -24,8 +24,8 @@ from boresight.interfaces.report.tma_words import (
     hull,
     region,
 )
-from boresight.tma.analyse import analyse
-from boresight.tma.result import Quantity, TmaResult
+from boresight.target_motion.analyse import analyse
+from boresight.target_motion.result import Quantity, TmaResult
 
 MEGABYTE = 1_000_000
 SECTIONS = "verdict picture history quantities cells residuals settings provenance"

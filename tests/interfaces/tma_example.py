@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 
-from boresight.tma.contact import Contact
-from boresight.tma.result import (
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.result import (
     Batch,
     Cells,
     Convergence,

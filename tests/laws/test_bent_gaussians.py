@@ -7,8 +7,8 @@ from boresight.filters import line_of_sight_moments as closed
 from boresight.filters import line_of_sight_plane as plane
 from boresight.filters import line_of_sight_space as space
 from boresight.filters.line_of_sight import LineOfSight, View
-from boresight.maths.mixing import matched
 from boresight.maths import Gaussian
+from boresight.maths.mixing import matched
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Pose, Radar
 from laws.enrolled import CHIRP, MOVING, PLANAR, PLANE, POLAR, SPACE, Entry, World, turned

@@ -9,7 +9,7 @@ import pytest
 
 from boresight import catalogue
 from boresight.filters.recursion import run_recursion
-from boresight.tma.result import Criteria
+from boresight.target_motion.result import Criteria
 from mixtures.heard import (
     OWN,
     RELATIVE,

@@ -11,8 +11,8 @@ from boresight.mixtures.range_parameterised import RangeParameterised, range_cel
 from boresight.mixtures.weights import weights_over_time
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Bearings, Pose
-from boresight.tma.moments import polar_moments
-from boresight.tma.quantities import as_polar, regions
+from boresight.target_motion.moments import polar_moments
+from boresight.target_motion.quantities import as_polar, regions
 from oracles import pradeep as paper
 
 pytestmark = pytest.mark.slow

@@ -3,7 +3,7 @@
 import numpy as np
 import polars as pl
 
-from boresight.tma.contacts import contacts
+from boresight.target_motion.contacts import contacts
 
 SIGMA = 0.5
 

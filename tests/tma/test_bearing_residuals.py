@@ -13,9 +13,9 @@ from scipy import stats
 
 from boresight.experiments.scenario import lookup
 from boresight.filters.batch import batch_map, velocity_prior
-from boresight.tma.contact import Contact
-from boresight.tma.fit import Fit, delay_slopes, fitted
-from boresight.tma.residuals import judge, whiteness
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.fit import Fit, delay_slopes, fitted
+from boresight.target_motion.residuals import judge, whiteness
 
 RUNS, SIGMA = 500, np.radians(0.33)
 NAMES = ["noise level", "whiteness", "outliers", "own ship's clock", "compass", "steady target"]

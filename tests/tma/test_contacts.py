@@ -15,7 +15,7 @@ from boresight.errors import DataError, UsageError
 from boresight.formats.bearings import read_bearings
 from boresight.formats.own_ship import read_own_ship
 from boresight.maths.frames import enu_from_geodetic
-from boresight.tma.contacts import contacts
+from boresight.target_motion.contacts import contacts
 
 HERE = Path(__file__).parents[2]
 ARRAY = HERE.parent / "shared" / "data" / "towed-array"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boresight.errors import UsageError
-from boresight.tma.convergence import (
+from boresight.target_motion.convergence import (
     check_criteria,
     converge,
     errors_inside,
@@ -14,7 +14,7 @@ from boresight.tma.convergence import (
     permitted,
     sure,
 )
-from boresight.tma.result import Criteria
+from boresight.target_motion.result import Criteria
 
 CRITERIA = Criteria()
 TRUTH = np.array([4_000.0, 0.2, 120.0, 15.0])

@@ -13,10 +13,10 @@ from boresight.formats.own_ship import read_own_ship
 from boresight.maths import Gaussian
 from boresight.mixtures.bank import Bank, run_bank
 from boresight.mixtures.range_parameterised import RangeParameterised
-from boresight.tma import observability
-from boresight.tma.contact import Contact
-from boresight.tma.contacts import contacts
-from boresight.tma.observability import observe
+from boresight.target_motion import observability
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.contacts import contacts
+from boresight.target_motion.observability import observe
 from mixtures import heard
 from oracles import pradeep as paper
 

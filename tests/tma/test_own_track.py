@@ -11,7 +11,7 @@ from pyproj import Geod
 
 from boresight.errors import DataError
 from boresight.maths.frames import enu_from_geodetic
-from boresight.tma.contacts import contacts
+from boresight.target_motion.contacts import contacts
 
 EARTH = Geod(ellps="WGS84")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from boresight.tma.planar import (
+from boresight.target_motion.planar import (
     Axes,
     angle_density,
     own_axes,

@@ -7,9 +7,9 @@ import pytest
 
 from boresight.maths import Gaussian
 from boresight.mixtures.bank import Bank
-from boresight.tma.contact import Contact
-from boresight.tma.moments import polar_moments
-from boresight.tma.quantities import as_polar, describe, history, regions
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.moments import polar_moments
+from boresight.target_motion.quantities import as_polar, describe, history, regions
 
 HERE = np.array([300.0, -200.0])
 NAMES = ("range_m", "bearing_deg", "course_deg", "speed_mps")

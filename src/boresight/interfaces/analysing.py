@@ -16,7 +16,7 @@ from boresight.interfaces.terminal import Manner, progress
 if TYPE_CHECKING:
     import polars as pl
 
-    from boresight.tma.result import Batch, Residuals, Side, TargetMotion, TmaResult
+    from boresight.target_motion.result import Batch, Residuals, Side, TargetMotion, TmaResult
 
 REPORT, TARGET = "report.html", "target.geojson"
 HISTORY, HISTORY_CSV = "history.parquet", "history.csv"

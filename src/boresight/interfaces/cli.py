@@ -147,6 +147,7 @@ def tma(
     filter: options.MotionFilter = None,  # noqa: A002 - the option is --filter
     ranges: options.Ranges = None,
     cells: options.CellCount = None,
+    overlap: options.Overlap = None,
     prune: options.Prune = None,
     speed: options.Speed = None,
     acceleration: options.Acceleration = 0.0,
@@ -176,6 +177,7 @@ def tma(
         cells=cells,
         nearest_m=nearest,
         farthest_m=farthest,
+        overlap=overlap,
         prune=prune,
         speed_mps=speed,
         accel_mps2=acceleration,

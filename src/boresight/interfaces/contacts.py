@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from boresight.errors import UsageError, unknown
-from boresight.tma.result import Criteria, TmaResult
+from boresight.target_motion.result import Criteria, TmaResult
 
 if TYPE_CHECKING:
     import polars as pl
@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from boresight.filters.method import Filter
 
 FILTER = "rp-ekf"
-OF_THE_BANK = ("cells", "nearest_m", "farthest_m", "prune")
+OF_THE_BANK = ("cells", "overlap", "nearest_m", "farthest_m", "prune")
+# More cells than the paper's six, wide enough to leave no gaps between them: regions of the range
+# then hold what they say before own ship turns.
+SMOOTH = {"cells": 12, "overlap": 1.5}
 OF_THE_BELIEF = ("nearest_m", "farthest_m", "speed_mps", "accel_mps2", "position_sd_m")
 
 
@@ -23,7 +26,9 @@ class Asked(TypedDict, total=False):
 
     Attributes:
         criteria: when the answer is good enough.
-        cells: how many range cells a bank has.
+        cells: how many range cells a bank has, 12 unless told.
+        overlap: how wide a cell begins, over the spread of a uniform range in it, 1.5 unless told;
+            6 cells with 1.0 are the paper's.
         nearest_m, farthest_m: between which ranges the contact is believed to be, m.
         prune: share of the weight below which a cell goes.
         speed_mps: what is believed of its velocity: standard deviation of each component.
@@ -44,6 +49,7 @@ class Asked(TypedDict, total=False):
 
     criteria: Criteria | None
     cells: int | None
+    overlap: float | None
     nearest_m: float | None
     farthest_m: float | None
     prune: float | None
@@ -78,9 +84,9 @@ def tma(
             and, if it has them, course_deg, speed_mps, heading_deg.
         filter: of the catalogue: a bank (rp-ekf, rp-mgekf, rp-ukf, rp-ckf, rp-modified-polar), or
             a single filter (ekf, mgekf, modified-polar, ukf, ...).
-        asked: see `Asked`: criteria, cells, nearest_m, farthest_m, prune, speed_mps, accel_mps2,
-            position_sd_m, track, sigma_deg, degrees, declination_deg, own_ship_clock_s, tow_m,
-            array_spacing_m, sound_speed_mps, columns, own_ship_columns.
+        asked: see `Asked`: criteria, cells, overlap, nearest_m, farthest_m, prune, speed_mps,
+            accel_mps2, position_sd_m, track, sigma_deg, degrees, declination_deg,
+            own_ship_clock_s, tow_m, array_spacing_m, sound_speed_mps, columns, own_ship_columns.
 
     Returns:
         The answers, the contact with most bearings first; `report` makes a page of them.
@@ -89,8 +95,8 @@ def tma(
         UsageError: a filter or setting that does not exist.
         DataError: what is wrong with a file, where, and what to do.
     """
-    from boresight.tma.analyse import Belief, analyse
-    from boresight.tma.contacts import contacts
+    from boresight.target_motion.analyse import Belief, analyse
+    from boresight.target_motion.contacts import contacts
 
     given: dict[str, Any] = {key: value for key, value in asked.items() if value is not None}
     for name in given:
@@ -118,7 +124,7 @@ def chosen_filter(name: str, **settings: Any) -> "Filter":
 
     chosen = catalogue.lookup(name)
     if not name.startswith("rp-"):
-        for key in ("cells", "prune"):
+        for key in ("cells", "overlap", "prune"):
             if key in settings:
                 raise UsageError(
                     f"{name} has no setting {key}",
@@ -126,7 +132,7 @@ def chosen_filter(name: str, **settings: Any) -> "Filter":
                     next_step=f"use rp-{name}, or leave it out",
                 )
         return chosen
-    return chosen.with_settings(**settings)
+    return chosen.with_settings(**(SMOOTH | settings))
 
 
 def _bearings(

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from boresight.filters.method import Filter
     from boresight.maths.frames import Site
     from boresight.models.atmosphere import Atmosphere
-    from boresight.tma.result import Criteria
+    from boresight.target_motion.result import Criteria
 
 
 def site(text: str) -> "Site":
@@ -233,7 +233,7 @@ def limits(text: str) -> "Criteria":
     Raises:
         UsageError: an unknown name, or what is no number or out of range.
     """
-    from boresight.tma.result import Criteria
+    from boresight.target_motion.result import Criteria
 
     found: dict[str, float] = {}
     for part in text.split(","):

@@ -74,7 +74,18 @@ Ranges = Annotated[
         help="Between which ranges the contact may be, m: NEAREST,FARTHEST.",
     ),
 ]
-CellCount = Annotated[int | None, Parameter(help="How many range cells a bank has.")]
+CellCount = Annotated[
+    int | None,
+    Parameter(show_default=lambda _: "12", help="How many range cells a bank has."),
+]
+Overlap = Annotated[
+    float | None,
+    Parameter(
+        show_default=lambda _: "1.5",
+        help="How wide a cell begins, over the spread of a uniform range in it. The paper's bank "
+        "is --cells 6 --overlap 1.",
+    ),
+]
 Prune = Annotated[float | None, Parameter(help="Share of the weight below which a cell goes.")]
 Speed = Annotated[
     float | None,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from boresight.calibration.result import Calibration
     from boresight.interfaces.report import Report
-    from boresight.tma.result import TmaResult
+    from boresight.target_motion.result import TmaResult
     from boresight.tracking.result import TrackingResult
 
 Array = Any
@@ -239,7 +239,7 @@ def report(
     """
     from boresight.calibration.result import Calibration
     from boresight.interfaces.report import report as build
-    from boresight.tma.result import TmaResult
+    from boresight.target_motion.result import TmaResult
     from boresight.tracking.result import TrackingResult
 
     first = TrackingResult | Calibration | TmaResult

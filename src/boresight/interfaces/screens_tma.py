@@ -10,7 +10,7 @@ from boresight.maths.digits import decimals, with_unit
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from boresight.tma.result import Quantity, Region, Side, TargetMotion, TmaResult
+    from boresight.target_motion.result import Quantity, Region, Side, TargetMotion, TmaResult
 
 ROWS = (
     ("range", "range_m", "m"),

@@ -124,6 +124,12 @@ class RangeParameterised:
 
     def layout(self, motion: Motion, sensor: Sensor) -> dict[str, Leaf]:
         """What each cell keeps, by name and number, and the weights."""
+        if self.member == "modified-polar" and _is_cone(sensor) and self.cells > FUSED_ON_CONES:
+            raise UsageError(
+                f"{self.cells} cells in modified polar coordinates, on both sides of a cone",
+                why="one compiled step holds no more than three such cells a side",
+                next_step="use cells=3, or rp-ekf; tma runs cells one by one and takes any number",
+            )
         own, count = self.filter.layout(motion, sensor), self._count(sensor)
         kept = {f"{name}_{i}": leaf for i in range(count) for name, leaf in own.items()}
         return kept | {"log_weights": Vector(count)}
@@ -134,12 +140,6 @@ class RangeParameterised:
         The angle's uncertainty, the velocity, and further states are the start's; their
         correlations with the position are not.
         """
-        if self.member == "modified-polar" and _is_cone(sensor) and self.cells > FUSED_ON_CONES:
-            raise UsageError(
-                f"{self.cells} cells in modified polar coordinates, on both sides of a cone",
-                why="one compiled step holds no more than three such cells a side",
-                next_step="use cells=3, or rp-ekf; tma runs cells one by one and takes any number",
-            )
         cells, _ = starts(self, start, motion, sensor)
         states = [self.filter.begin(cell, motion, sensor) for cell in cells]
         return self._keep(states, np.zeros(len(cells)))

@@ -18,7 +18,7 @@ from boresight.experiments.papers.pradeep_words import (
 )
 from boresight.experiments.scenario import SPEEDS_MPS
 from boresight.experiments.verdicts import Claim, of_share, said, share_interval
-from boresight.tma.convergence import errors_inside, first_and_sustained, permitted
+from boresight.target_motion.convergence import errors_inside, first_and_sustained, permitted
 
 Array = Any
 _DRAWN = ("RP", "MGEKF")

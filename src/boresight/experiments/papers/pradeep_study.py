@@ -20,7 +20,7 @@ from boresight.experiments.simulate import Plots, Truth, simulate
 from boresight.filters.fisher import polar_sd
 from boresight.maths import Gaussian
 from boresight.mixtures.range_parameterised import range_cells
-from boresight.tma.result import Criteria
+from boresight.target_motion.result import Criteria
 
 Array = Any
 NEAR = "MGEKF started near"

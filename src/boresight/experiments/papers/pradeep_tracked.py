@@ -19,8 +19,8 @@ from boresight.filters.start import on_bearing
 from boresight.maths import Gaussian
 from boresight.mixtures.weights import GONE
 from boresight.models.sensors import Radar
-from boresight.tma.convergence import errors_inside, first_and_sustained
-from boresight.tma.result import Criteria
+from boresight.target_motion.convergence import errors_inside, first_and_sustained
+from boresight.target_motion.result import Criteria
 
 Array = Any
 QUANTITIES = {"range": "m", "bearing": "°", "course": "°", "speed": "m/s"}

@@ -17,7 +17,7 @@ from boresight.interfaces.report.sections import Part
 
 if TYPE_CHECKING:
     from boresight.calibration.result import Calibration
-    from boresight.tma.result import TmaResult
+    from boresight.target_motion.result import TmaResult
     from boresight.tracking.result import Comparison, TrackingResult
 
 # The library compiles its drawing commands, hence unsafe-eval; nothing may be fetched at all.

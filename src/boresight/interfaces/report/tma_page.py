@@ -21,7 +21,7 @@ from boresight.interfaces.report.tma_words import KINDS, estimate, hull
 from boresight.interfaces.report.words import figure, panel
 
 if TYPE_CHECKING:
-    from boresight.tma.result import TargetMotion, TmaResult
+    from boresight.target_motion.result import TargetMotion, TmaResult
 
 DETAILED = 12  # contacts that are drawn; more, and the page would grow past what a mail carries
 TALL_PX, MIDDLE_PX, WEIGHTS_PX = 760, 560, 300

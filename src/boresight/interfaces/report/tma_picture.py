@@ -12,7 +12,7 @@ from boresight.interfaces.report.residuals import Floats, Panel
 from boresight.interfaces.report.tma_view import View, dots, floats, line, thinned
 
 if TYPE_CHECKING:
-    from boresight.tma.result import Quantity
+    from boresight.target_motion.result import Quantity
 
 CAPTION = (
     "North up, equal scales. Own ship's track with its direction, and some of the bearings as "

@@ -12,7 +12,7 @@ from boresight.interfaces.report.tma_view import View, band, dots, line, thinned
 from boresight.interfaces.report.words import Cell, figure, table, text_cell
 
 if TYPE_CHECKING:
-    from boresight.tma.result import Test
+    from boresight.target_motion.result import Test
 
 MOST_DOTS = 4_000
 WORDS = (

@@ -19,7 +19,7 @@ from boresight.interfaces.report.tma_words import (
 from boresight.interfaces.report.words import Cell, figure, number_cell, table, text_cell
 
 if TYPE_CHECKING:
-    from boresight.tma.result import Quantity, Side, TargetMotion
+    from boresight.target_motion.result import Quantity, Side, TargetMotion
 
 NONE = Cell("–")
 

@@ -22,7 +22,7 @@ from boresight.interfaces.report.verdict import Sentence
 from boresight.interfaces.report.words import figure
 
 if TYPE_CHECKING:
-    from boresight.tma.result import Criteria, TargetMotion, TmaResult
+    from boresight.target_motion.result import Criteria, TargetMotion, TmaResult
 
 FEW = 10  # bearings
 TOO_SURE = 0.5  # of the bound: a smaller sd is a fault, not luck

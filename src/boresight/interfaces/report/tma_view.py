@@ -11,7 +11,7 @@ from boresight.interfaces.report import charts
 from boresight.interfaces.report.residuals import Floats, column
 
 if TYPE_CHECKING:
-    from boresight.tma.result import TargetMotion
+    from boresight.target_motion.result import TargetMotion
 
 MOST_STEPS = 900  # of one contact that are drawn; a screen has hardly more columns
 SHADE = "rgba(213,94,0,0.07)"

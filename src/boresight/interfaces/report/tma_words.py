@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from boresight.maths.digits import decimals
 
 if TYPE_CHECKING:
-    from boresight.tma.result import Quantity
+    from boresight.target_motion.result import Quantity
 
 KNOT_MPS = 1852.0 / 3600.0
 METRES_BELOW = 1_000.0

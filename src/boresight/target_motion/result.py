@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from boresight.tma.contact import Contact
+from boresight.target_motion.contact import Contact
 
 if TYPE_CHECKING:
     import polars as pl

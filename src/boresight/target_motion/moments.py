@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boresight.maths import wrap
-from boresight.tma.planar import Axes, own_axes, quadrature, spots
+from boresight.target_motion.planar import Axes, own_axes, quadrature, spots
 
 Array = Any
 

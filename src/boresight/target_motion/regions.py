@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from boresight.tma.planar import Axes, angle_density, radius_probability, scattered, spots
-from boresight.tma.result import LEVELS, Region
+from boresight.target_motion.planar import Axes, angle_density, radius_probability, scattered, spots
+from boresight.target_motion.result import LEVELS, Region
 
 Array = Any
 _POINTS = 224  # of a cell with all the weight, for the grid

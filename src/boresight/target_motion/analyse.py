@@ -17,12 +17,12 @@ from boresight.mixtures.bank import Bank, run_bank
 from boresight.mixtures.range_parameterised import SPEED_MPS, RangeParameterised
 from boresight.models.checks import not_negative, positive
 from boresight.models.motion import ConstantVelocity
-from boresight.tma.contact import Contact
-from boresight.tma.convergence import check_criteria, converge
-from boresight.tma.observability import observe
-from boresight.tma.quantities import QUANTITIES, as_polar, describe, history
-from boresight.tma.residuals import judge
-from boresight.tma.result import (
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.convergence import check_criteria, converge
+from boresight.target_motion.observability import observe
+from boresight.target_motion.quantities import QUANTITIES, as_polar, describe, history
+from boresight.target_motion.residuals import judge
+from boresight.target_motion.result import (
     Batch,
     Cells,
     Criteria,

@@ -11,7 +11,7 @@ from boresight.maths.angles import wrap
 if TYPE_CHECKING:
     import polars as pl
 
-    from boresight.tma.own_track import OwnTrack
+    from boresight.target_motion.own_track import OwnTrack
 
 Array = Any
 _SOUND_MPS = 1500.0

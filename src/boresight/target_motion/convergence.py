@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import UsageError
-from boresight.tma.result import Convergence, Criteria
+from boresight.target_motion.result import Convergence, Criteria
 
 Array = Any
 

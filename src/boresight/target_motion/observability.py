@@ -17,8 +17,8 @@ from boresight.mixtures.bank import Bank
 from boresight.mixtures.range_parameterised import SPEED_MPS
 from boresight.models.checks import positive
 from boresight.models.motion import ConstantVelocity
-from boresight.tma.contact import Contact
-from boresight.tma.result import Observability
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.result import Observability
 
 Array = Any
 SHARE = 0.95  # of the weight that must agree

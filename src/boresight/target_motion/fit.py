@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from boresight.tma.contact import Contact
+from boresight.target_motion.contact import Contact
 
 Array = Any
 

@@ -16,10 +16,10 @@ from boresight.errors import DataError, UsageError, unknown
 from boresight.formats.bearings import bearings_table
 from boresight.formats.own_ship import own_ship_table
 from boresight.maths.angles import wrap
-from boresight.tma.angles import angles
-from boresight.tma.clocks import inside, one_clock
-from boresight.tma.contact import Contact
-from boresight.tma.own_track import OwnTrack, need_axis, own_track
+from boresight.target_motion.angles import angles
+from boresight.target_motion.clocks import inside, one_clock
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.own_track import OwnTrack, need_axis, own_track
 
 if TYPE_CHECKING:
     import polars as pl

@@ -12,11 +12,18 @@ from typing import Any
 import numpy as np
 
 from boresight.mixtures.bank import Bank
-from boresight.tma.contact import Contact
-from boresight.tma.moments import Cells, cell_moments, mixed, mixture_moments, planes, polar_moments
-from boresight.tma.planar import Axes
-from boresight.tma.regions import angle_regions, normal_ends, radius_regions
-from boresight.tma.result import Quantity, Side
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.moments import (
+    Cells,
+    cell_moments,
+    mixed,
+    mixture_moments,
+    planes,
+    polar_moments,
+)
+from boresight.target_motion.planar import Axes
+from boresight.target_motion.regions import angle_regions, normal_ends, radius_regions
+from boresight.target_motion.result import Quantity, Side
 
 Array = Any
 QUANTITIES = ("range_m", "bearing_deg", "course_deg", "speed_mps")

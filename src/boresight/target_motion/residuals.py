@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boresight.tma.contact import Contact
-from boresight.tma.fit import Fit, delay_slopes, fitted
-from boresight.tma.result import Residuals, Test
+from boresight.target_motion.contact import Contact
+from boresight.target_motion.fit import Fit, delay_slopes, fitted
+from boresight.target_motion.result import Residuals, Test
 
 if TYPE_CHECKING:
     from boresight.filters.batch import BatchEstimate
