@@ -216,7 +216,6 @@ FAULTS = (
     *faults(
         "target_motion/quantities.py",
         ("states[..., :2] - position", "states[..., :2]"),
-        ("variances + apart * apart", "variances"),
         ("DECIDED = 0.99", "DECIDED = 0.4"),
         ("np.concatenate([weights[:1], weights[:-1]])", "weights"),
         ("kept / share if share > 0.0 else kept", "kept"),
