@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import boresight as bs
 from boresight.errors import UsageError
 from boresight.filters import ekf
 from boresight.filters.recursion import Recursion, run_recursion
@@ -343,3 +344,18 @@ def test_cells_that_overlap_are_as_much_wider_and_begin_in_the_same_places():
 def test_an_overlap_is_above_zero_and_finite(overlap):
     with pytest.raises(UsageError, match="overlap"):
         RangeParameterised(overlap=overlap)
+
+
+@pytest.mark.parametrize(
+    ("motion", "sensor", "said"),
+    [
+        (2, bs.Radar(range_m=30.0, azimuth_deg=1.0), "no use for range_m"),
+        (2, bs.Radar(range_rate_mps=1.0), "no use for range_rate"),
+        (3, bs.Bearings(azimuth_deg=1.0), "3 dimensions"),
+    ],
+)
+def test_a_bank_is_for_bearings_in_the_plane(motion, sensor, said):
+    plane = bs.ConstantVelocity(accel_mps2=0.0, dims=motion)
+    plots = np.full((2, 4, len(sensor.names)), 0.3)
+    with pytest.raises(bs.UsageError, match=said):
+        bs.run("rp-ekf", plane, sensor, plots, dt=1.0)

@@ -115,7 +115,7 @@ class RangeParameterised:
             sensor: bearings, or a cone.
             speed_mps: spread of each velocity.
         """
-        _check(sensor)
+        _check(motion, sensor)
         middles, spreads = self.ranges
         middle = middles.mean()
         spread = float(np.sqrt(np.mean(spreads**2 + (middles - middle) ** 2)))
@@ -124,6 +124,7 @@ class RangeParameterised:
 
     def layout(self, motion: Motion, sensor: Sensor) -> dict[str, Leaf]:
         """What each cell keeps, by name and number, and the weights."""
+        _check(motion, sensor)
         if self.member == "modified-polar" and _is_cone(sensor) and self.cells > FUSED_ON_CONES:
             raise UsageError(
                 f"{self.cells} cells in modified polar coordinates, on both sides of a cone",
@@ -197,7 +198,7 @@ def starts(
     bank: RangeParameterised, start: Gaussian, motion: Motion, sensor: Sensor
 ) -> tuple[list[Gaussian], Array]:
     """Where each cell begins, and its side: -1 left of the axis, 1 right of it, 0 without sides."""
-    _check(sensor)
+    _check(motion, sensor)
     sides = [start, _mirrored(start, motion, sensor)][: 1 + _is_cone(sensor)]
     spots = zip(*bank.ranges, strict=True)
     cells = [
@@ -213,13 +214,19 @@ def _is_cone(sensor: Sensor) -> bool:
     return "cone_rad" in sensor.names
 
 
-def _check(sensor: Sensor) -> None:
-    """The bank begins on an angle in the plane."""
-    if not {"azimuth_rad", "cone_rad"} & set(sensor.names):
+def _check(motion: Motion, sensor: Sensor) -> None:
+    """The bank begins on an angle in the plane, at ranges that nothing measures."""
+    if "range_m" in sensor.names or not {"azimuth_rad", "cone_rad"} & set(sensor.names):
         raise UsageError(
             f"a range-parameterised bank has no use for {', '.join(sensor.names)}",
-            why="it begins on a bearing",
-            next_step="use bs.Bearings(azimuth_deg=...) or bs.ConicalBearings(...)",
+            why="it begins on a bearing, at every range that may be",
+            next_step="use bs.Bearings(azimuth_deg=...) or bs.ConicalBearings(...), or mekf",
+        )
+    if motion.dims != 2:
+        raise UsageError(
+            f"a range-parameterised bank cannot follow {motion.dims} dimensions",
+            why="a bearing is an angle in the plane",
+            next_step="use a motion with dims=2",
         )
 
 
