@@ -210,3 +210,20 @@ def test_filters_that_need_a_range_say_which_does_not(name):
     with pytest.raises(UsageError, match="without range_m") as caught:
         bs.run(name, STRAIGHT, heard_from((0.0, 0.0)), np.ones((1, 4, 1)), dt=1.0)
     assert "rp-ekf" in str(caught.value)
+
+
+@pytest.mark.parametrize("inverse", [1e-9, -1e-3, 2e-5, 1e-4])
+def test_what_is_told_is_positive_definite_however_little_is_known_of_the_range(inverse):
+    """Known to a tenth of a metre per second across the line of sight, and not at all along it."""
+    sensor, own = heard_from((3e3, -4e3)), {"position": np.array([3e3, -4e3]), "velocity": [5.0, 2]}
+    cov = np.diag([5e-7, 5e-6, 2e-3, 5.0]) ** 2
+    state = {"mean": np.array([2e-5, 1e-4, 0.7, inverse]), "cov": cov, **own}
+    told = ModifiedPolar().output(state, STRAIGHT, sensor)
+    along = np.array([np.cos(0.7), np.sin(0.7)])
+    assert along @ told.cov[:2, :2] @ along == pytest.approx(2e5**2, rel=1e-6)
+    far = np.linalg.norm(told.mean[:2] - own["position"])
+    assert along[::-1] * [-1, 1] @ told.cov[:2, :2] @ (along[::-1] * [-1, 1]) == pytest.approx(
+        (2e-3 * far) ** 2, rel=1e-3
+    )
+    assert np.array_equal(told.cov, told.cov.T)
+    np.linalg.cholesky(told.cov)

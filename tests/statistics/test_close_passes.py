@@ -23,7 +23,8 @@ from mixtures.heard import (
 from oracles import pradeep as paper
 
 GAP_S, STEPS, NEAREST_M = 10.0, 41, 50.0
-NAMES = ("ekf", "mgekf", "rp-ekf", "rp-mgekf", "rp-ukf", "rp-ckf")
+NAMES = ("ekf", "mgekf", "modified-polar")
+NAMES += ("rp-ekf", "rp-mgekf", "rp-ukf", "rp-ckf", "rp-modified-polar")
 
 
 def close_passes(count, seed):

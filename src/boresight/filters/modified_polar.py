@@ -45,7 +45,8 @@ class ModifiedPolar:
         range_m, range_sd_m: of the range where it begins on a first bearing, m: those of a uniform
             range from 1 to 20 km.
         nearest_m, farthest_m: a range beyond is told as this one: of a target that passes close, or
-            while one over the range is near zero or below.
+            while one over the range is near zero or below; its spread is told as no more than
+            the farthest.
         predicted: by cubature `points`, or to `first order`, which is the extended Kalman filter.
     """
 
@@ -145,12 +146,18 @@ class ModifiedPolar:
         return _keep(Gaussian(post.mean, post.cov), *own), Surprise(*post[2:])
 
     def output(self, state: State, motion: Motion, sensor: Sensor) -> Gaussian:
-        """To first order, at a range that is neither too near nor too far."""
+        """To first order, at a range that is neither too near nor too far, nor spread beyond that.
+
+        Its spread would else reach 1e10 m where a close pass leaves one over the range near zero:
+        beside it, in double precision, nothing is left of what is known across it.
+        """
         del motion, sensor
         own = np.concatenate([state["position"], state["velocity"]])
         mean = np.array(state["mean"])
         mean[3] = self._within(mean[3])
+        variance, most = state["cov"][3, 3], (self.farthest_m * mean[3] ** 2) ** 2
         mean, J = jacobian(lambda kept: _plane(kept, own), mean)
+        J[:, 3] = J[:, 3] * np.sqrt(most / select(variance > most, variance, most))
         return Gaussian(mean, mirror(J @ state["cov"] @ J.T))
 
     def _within(self, inverse: Any) -> Any:
