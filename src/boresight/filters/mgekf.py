@@ -5,18 +5,16 @@ Modified Gain Extended Kalman Filter with Applications to Estimation with Bearin
 Measurements", 1985, and P. J. Galkowski and M. A. Islam, "An Alternative Derivation of the Modified
 Gain Function of Song and Speyer", 1991.
 Differs from them, by errata P3 to P7: arctan2 and wrapped innovations; H at the prediction; g
-without the printed sine; it enters the covariance only, in I - G g, where I is a matrix. The state
-is the target's own position and velocity, and own ship is the sensor's pose: the same as the
-paper's relative state with its known input b.
+without the printed sine; it enters the covariance only, in I - G g, where I is a matrix. By choice:
+g is H where it would make the covariance grow, unless `may_grow`, as nothing in (ix) bounds that.
+Of 20,000 targets that passed own ship within 50 m, 3 % then claimed a spread beyond 100 km, the
+worst 600,000 km (8 km with H there). g is H beyond `widest_deg` too, where a measured bearing says
+little of the true one. The state is the target's own position and velocity, and own ship is the
+sensor's pose: the same as the paper's relative state with its known input b.
 
 With the true bearing B = B^ + d, h(X) - h(X^) = g (X - X^) holds exactly for
 g = d/(R^ sin d) [cos B, -sin B] on (East, North): B is the measured bearing here. Song and Speyer
 have 1/(R^ cos d), which is d/tan d short of it and infinite where d is a quarter of a turn.
-
-Nothing there keeps the covariance from growing at every bearing where g and H differ much: a minute
-after a target has passed close by, kilometres are millions of them. So g is H where it would make
-the state less certain than it was (`may_grow` lets it, as the paper does), and beyond `widest_deg`,
-where the measured bearing says little of the true one.
 """
 
 from collections.abc import Sequence

@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boresight.interfaces import calibrating, door, screens, screens_calibration
+from boresight.interfaces import calibrating, door, screens, screens_calibration, screens_reproduce
 from boresight.interfaces.answers import Answer
 from boresight.interfaces.applying import applied
 from boresight.interfaces.reading import own_site
@@ -191,7 +191,9 @@ def reproduce(
     with progress(f"Reproducing {key}", manner):
         seed = SEED if seed is None else seed
         found = repeat(key, runs=runs, seed=seed, output=output, assume=assume)
-    return Answer(content=found, screen=lambda _width: screens.reproduced(key, found))
+    return Answer(
+        content=found, screen=lambda width: screens_reproduce.reproduced(key, found, width)
+    )
 
 
 def cite(name: str, _manner: Manner) -> Answer:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 WIDE = 100
 NARROW = 80
 WORST = 8
-LONG = 4  # values of a list that are all shown
 
 
 def table(heading: str, *heads: str, left: int = 1) -> "Table":
@@ -190,46 +189,6 @@ def compared(heading: str, comparisons: "Sequence[Comparison]") -> "RenderableTy
 
 def _duration(ns: float) -> str:
     return f"{figure(ns / 1000, 3)} µs" if ns >= 1000 else f"{figure(ns, 3)} ns"
-
-
-def reproduced(key: str, found: dict[str, Any]) -> "list[RenderableType]":
-    """The screen of `boresight reproduce`."""
-    claims = found["claims"]
-    grid = table(f"{key}: {len(claims)} claims", "claim", "published", "ours", "verdict", left=4)
-    for column in grid.columns:
-        column.no_wrap, column.overflow = False, "fold"
-    grid.columns[0].no_wrap = True
-    styles = {"reproduces": "green", "in band": "green", "does not reproduce": "red"}
-    for each in claims:
-        verdict = text(each["verdict"], styles.get(each["verdict"], "yellow"))
-        values = (text(_lines(each[name])) for name in ("published", "ours"))
-        grid.add_row(each["id"], *values, verdict)
-    counts = {each["verdict"]: 0 for each in claims}
-    for each in claims:
-        counts[each["verdict"]] += 1
-    total = ", ".join(f"{number} {verdict}" for verdict, number in counts.items())
-    more = "; --json adds bands, assumptions and the parts of each claim"
-    return [grid, text(f"{total}; seed {found['seed']}{more}")]
-
-
-def _lines(value: Any) -> str:
-    """A value of a claim: what has names a line each."""
-    if not isinstance(value, dict):
-        return _value(value)
-    rows = [f"{name}: {_value(each)}" for name, each in value.items()]
-    return "\n".join(rows)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, float):
-        return figure(value)
-    if isinstance(value, (list, tuple)):
-        if len(value) > LONG:
-            return f"{_value(value[0])}, {_value(value[1])}, ... {_value(value[-1])}"
-        return ", ".join(map(_value, value))
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {_value(each)}" for name, each in value.items())
-    return "–" if value is None else str(value)
 
 
 def cited(found: dict[str, Any]) -> "list[RenderableType]":

@@ -120,13 +120,29 @@ def _before_the_manoeuvre(study: Study) -> Claim:
             "RMS error of the range, m": by_time(study, rms(study.tracked["RP"].error[..., 0])),
             "bound, m": by_time(study, study.bound_sd[:, 0]),
             "without a manoeuvre, m": by_time(study, rms(study.straight.error[..., 0])),
-        },
+        }
+        | _shown_weights(study),
         verdict=together([each.verdict for each in parts]),
         assumption="before own ship turns, bearings tell three numbers of four: each range goes "
         "with a velocity, so weights of ranges are those of velocities, and these are assumed; "
         + reasons(study, "speed_sd_mps", "speed_sds_mps"),
         parts=parts,
     )
+
+
+def _shown_weights(study: Study) -> dict[str, dict[str, float]]:
+    """Mean weights of the cells, by the spread of velocity at the start and without a manoeuvre."""
+    straight, k = study.straight.weights.mean(axis=0), study.at(study.before)
+    shown = {
+        f"weights at {study.before:g} s, ± {sd:g} m/s": found[k]
+        for sd, found in study.by_speed_sd.items()
+    }
+    shown[f"without a manoeuvre, {study.before:g} s"] = straight[k]
+    shown["without a manoeuvre, at the end"] = straight[-1]
+    return {
+        name: {f"cell {i}": float(weight) for i, weight in enumerate(weights, start=1)}
+        for name, weights in shown.items()
+    }
 
 
 def _by_speed(study: Study) -> Claim:

@@ -19,13 +19,21 @@ from boresight.experiments.papers.pradeep_words import (
 from boresight.experiments.verdicts import Claim, less, of_differences, part, together
 
 Array = Any
-_RIVALS = {"wide start": "MGEKF", "start near the truth": NEAR}
+
+
+def _rivals(study: Study) -> dict[str, str]:
+    """How the single filter starts, and its name."""
+    return {"wide start": "MGEKF", f"start at {_near(study)}": NEAR}
+
+
+def _near(study: Study) -> str:
+    return f"{study.assumed['near_start_m']:g} ± {study.assumed['near_start_sd_m']:g} m"
 
 
 def faster(study: Study) -> Claim:
     """PR-C1, from the wide start and from one that knows the range roughly."""
     one, times = study.tracked["RP"], {}
-    for start, rival in _RIVALS.items():
+    for start, rival in _rivals(study).items():
         other = study.tracked[rival]
         gap = bias(other.converged - one.converged)
         times[start] = part(
@@ -58,7 +66,7 @@ def lower_range_error(study: Study) -> Claim:
     """PR-C2, from when the paper's run has converged, bearing by bearing."""
     one, errors = study.tracked["RP"], {}
     after = slice(study.at(study.converge_s), None)
-    for start, rival in _RIVALS.items():
+    for start, rival in _rivals(study).items():
         other = study.tracked[rival]
         gap = bias(one.error[:, after, 0] ** 2 - other.error[:, after, 0] ** 2)
         share = np.mean(less(gap.value, gap.standard_error))
@@ -89,12 +97,11 @@ def lower_range_error(study: Study) -> Claim:
 def _knowing(study: Study, parts: dict[str, Claim]) -> str:
     """How an MGEKF does that knows the range roughly, in one sentence or two."""
     near, bank = study.tracked[NEAR], study.tracked["RP"]
-    worse = parts["start near the truth"].verdict == "reproduces"
+    worse = parts[f"start at {_near(study)}"].verdict == "reproduces"
     ends = [np.sqrt(np.mean(each.square[:, -1])) for each in (near, bank)]
     told = "does worse" if worse else "does as well: what the bank gains is not to need that range"
     return (
-        f"An MGEKF started at {study.assumed['near_start_m']:g} ± "
-        f"{study.assumed['near_start_sd_m']:g} m {told} (median {np.median(near.converged):.0f} s "
+        f"An MGEKF started at {_near(study)} {told} (median {np.median(near.converged):.0f} s "
         f"against {np.median(bank.converged):.0f} s, position RMSE at the end {ends[0]:.0f} m "
         f"against {ends[1]:.0f} m)"
     )

@@ -44,7 +44,8 @@ def figure(value: float | None, digits: int = 4) -> str:
         return "–"
     if isinstance(value, int) or value == 0:
         return f"{value:,.0f}"
-    places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    rounded = float(f"{value:.{digits - 1}e}")  # 0.09999999 has the places of 0.1
+    places = max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)
     return f"{value:,.{places}f}"
 
 
