@@ -13,6 +13,7 @@ from scipy import stats
 from boresight import catalogue
 from boresight.interfaces.report import report, tma_picture, tma_residuals, tma_waterfall
 from boresight.interfaces.report.tma_history import allowed, marks, panels
+from boresight.interfaces.report.tma_tables import contacts, failures
 from boresight.interfaces.report.tma_verdict import sentences, summary
 from boresight.interfaces.report.tma_view import View, stretches, thinned, unwrapped
 from boresight.interfaces.report.tma_words import (
@@ -110,8 +111,8 @@ def test_text_from_the_file_cannot_leave_its_element(states):
         settings={bad: bad},
         remarks=(bad,),
     )
-    for contacts in ((hostile,), (hostile, hostile)):
-        html = report(motion=TmaResult(contacts=contacts, remarks=(bad,))).html
+    for every in ((hostile,), (hostile, hostile)):
+        html = report(motion=TmaResult(contacts=every, remarks=(bad,))).html
         assert bad not in html
         assert Page(html).faults == []
 
@@ -169,22 +170,77 @@ def test_a_batch_estimate_far_off_is_a_warning(states):
     assert apart == {"quantities": "attention"}
 
 
-def test_a_filter_that_is_surer_than_it_can_be_is_told_off(states):
+def test_of_a_filter_that_is_surer_than_it_can_be_nothing_is_repeated(states):
     motion = states["no turn"]
-    assert "too sure of itself" not in said(motion)
+    assert "With what was believed before" in said(motion)
     sure = motion.history.with_columns(range_sd_m=0.4 * motion.history["range_bound_m"])
     words = said(replace(motion, history=sure))
-    assert "<b>The filter is too sure of itself:</b>" in words
     assert "With what was believed before" not in words
     assert "no better known" not in words
+
+
+def test_what_speaks_against_the_answer_is_said_once(states):
+    motion = states["known"]
+    assert motion.residuals.tests[1].words == motion.remarks[1]
+    assert page_of(motion).count("<p>" + motion.remarks[1]) == 1
+    places = {each.html: each.link for each in sentences(motion) if each.mark == "attention"}
+    assert places[motion.remarks[1]] == "residuals"
+    assert places[motion.remarks[0]] == "history"
+    listed = re.search(r"<h3>Remarks.*?</ul>", page_of(motion), re.DOTALL)[0]
+    assert "a made contact" in listed
+    assert not any(each in listed for each in motion.remarks)
+
+
+def test_an_answer_before_the_bound_permits_it_is_no_merit(states):
+    motion = states["known"]
+    assert "surer than can be counted on" not in said(motion)
+    early = replace(motion.convergence, permitted_s=180.0)
+    assert "surer than can be counted on" in said(replace(motion, convergence=early))
+
+
+def test_a_test_says_whether_it_was_asked_and_from_what_it_follows(states):
+    first, second = states["known"].residuals.tests
+    tests = (
+        replace(first, passed=False, follows="compass"),
+        replace(second, passed=True, asked=False, p_value=1.0),
+        replace(first, name="compass", passed=False),
+    )
+    residuals = replace(states["known"].residuals, tests=tests)
+    motion = replace(states["known"], residuals=residuals)
+    rows = re.findall(r"<tr>(.*?)</tr>", tma_residuals.words(View(motion)))[1:]
+    assert [re.search("failed|not asked|passed", row)[0] for row in rows] == [
+        "failed",
+        "not asked",
+        "failed",
+    ]
+    assert "failed, as compass would explain" in rows[0]
+    assert rows[1].count("–") == 2
+    assert failures(motion) == ["compass"]
+    assert "pass all" not in said(motion)
+    good = replace(residuals, tests=(first, tests[1]))
+    assert "pass all 1 tests" in said(replace(motion, residuals=good))
 
 
 def test_a_file_of_contacts_is_summed_up():
     marks_and_words = [(each.mark, each.html) for each in summary(made.many(9))]
     assert marks_and_words[0][0] == "attention"
-    assert "3 of 9 contacts can be told" in marks_and_words[0][1]
+    assert "3 of the 9 contacts can be told" in marks_and_words[0][1]
     assert "while it heard 6 of them" in marks_and_words[0][1]
     assert "3 contacts both sides" in marks_and_words[2][1]
+    assert "The residuals of 9 contacts" in marks_and_words[3][1]
+    assert "whiteness 9" in marks_and_words[3][1]
+
+
+def test_columns_of_which_no_contact_has_a_value_are_left_out():
+    def heads(found):
+        table = contacts(found, ())
+        return re.findall(r'<button type="button">(.*?)</button>', table)
+
+    every = made.many(3).contacts
+    assert {"range", "course", "speed", "side", "good since"} <= set(heads(every))
+    unknown = heads(every[1:2])
+    assert "range, 90 %" in unknown
+    assert not {"range", "course", "speed", "side", "good since"} & set(unknown)
 
 
 # ---- figures ----
@@ -251,6 +307,48 @@ def test_both_sides_have_their_region_until_one_is_decided(states):
     assert {"target", "batch estimate", "where it may be now"} <= names
 
 
+def test_tracks_that_fit_end_where_the_cells_that_are_left_have_the_target(states):
+    motion = states["no turn"]
+    weights = np.array([[0.005, 0.2, 0.3, 0.3, 0.1, 0.095]])  # the last has no mean
+    motion = replace(motion, cells=replace(motion.cells, weights=weights))
+    (tracks,) = named(picture(motion), tma_picture.FITTING)
+    north, east = (unpack(tracks[axis]).astype(float).reshape(-1, 3) for axis in "yx")
+    mean = motion.cells.mean[1:5]
+    now = np.stack([north[:, 1], east[:, 1]], axis=-1)
+    assert now == pytest.approx(mean[:, :2] / 1e3, rel=1e-4)
+    moving = replace(motion.cells, mean=motion.cells.mean + np.array([0.0, 0.0, 3.0, -2.0]))
+    (tracks,) = named(picture(replace(motion, cells=moving)), tma_picture.FITTING)
+    north, east = (unpack(tracks[axis]).astype(float).reshape(-1, 3) for axis in "yx")
+    assert north[:, 1] - north[:, 0] == pytest.approx(2.4, abs=1e-3)
+    assert east[:, 1] - east[:, 0] == pytest.approx(-1.6, abs=1e-3)
+    assert named(picture(states["known"]), tma_picture.FITTING) == []
+
+
+def test_bearings_end_at_the_track_and_the_grid_is_square(states):
+    motion = states["known"]
+    chart = picture(motion)
+    (heard,) = named(chart, "bearings")
+    east, north = (unpack(heard[axis]).astype(float).reshape(-1, 3) for axis in "xy")
+    length = np.hypot(east[:, 1] - east[:, 0], north[:, 1] - north[:, 0])
+    time = motion.history["time_s"].to_numpy()
+    at = thinned(len(time), tma_picture.LINES)
+    back = time[-1] - time
+    away = motion.mean[:2] - back[:, None] * motion.mean[2:] - motion.contact.position_m
+    away = np.hypot(*away.T)[np.isfinite(motion.contact.bearing_rad)] / 1e3
+    assert len(length) <= len(at) + 1
+    assert length.min() == pytest.approx(1.04 * away.min(), rel=0.2)
+    assert length.max() == pytest.approx(1.04 * away.max(), rel=0.2)
+    steps = {chart["layout"][axis]["dtick"] for axis in ("xaxis", "yaxis")}
+    assert len(steps) == 1
+    assert 2.0 in steps
+
+
+def test_of_a_cone_on_a_side_the_other_is_not_drawn(states):
+    (both,) = named(picture(states["sides"]), "bearings")
+    (one,) = named(picture(states["side decided"]), "bearings")
+    assert len(unpack(both["x"])) == pytest.approx(2 * len(unpack(one["x"])), abs=6)
+
+
 def test_a_cone_is_drawn_on_both_sides_of_the_axis(states):
     contact = states["sides"].contact
     right, left = tma_picture.sides_heard(View(states["sides"]))
@@ -301,6 +399,19 @@ def test_the_waterfall_is_cut_where_nothing_was_heard():
     axis = chart["layout"]["xaxis"]
     assert all(0 <= float(word) < 360 for word in axis["ticktext"])
     assert float(axis["ticktext"][0]) == axis["tickvals"][0] % 360
+
+
+def test_true_bearings_have_their_width_for_themselves(states):
+    chart = tma_waterfall.panel([View(states["known"])]).chart
+    (heading,) = named(chart, "own ship's heading")
+    assert heading["xaxis"] == "x2"
+    x = unpack(heading["x"])
+    assert (np.nanmax(x), np.nanmin(x)) == pytest.approx((90.0, -90.0), abs=0.1)
+    low, high = chart["layout"]["xaxis"]["range"]
+    deg = np.degrees(states["known"].contact.bearing_rad) % 360
+    assert high - low < 1.1 * np.ptp(deg[np.isfinite(deg)]) + 4
+    cone = tma_waterfall.panel([View(states["sides"])]).chart
+    assert "xaxis2" not in cone["layout"]
 
 
 def test_quantiles_of_noise_as_stated_lie_in_the_band(states):

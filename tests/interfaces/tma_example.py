@@ -152,12 +152,22 @@ def motion(
         cells=Cells(
             range_m=np.tile(RANGE_M, 2 if conical else 1), side=side,
             weights=weights / weights.sum(1, keepdims=True),
+            mean=_means(own, bearing, 2 if conical else 1),
         ),
         batch=Batch(mean=mean, cov=cov, cost=400.0, converged=True, **told),
         residuals=Residuals(deg=deg, tests=tests, false_alarm=0.01),
         settings={"cells": 6, "nearest_m": 1000.0, "farthest_m": 20000.0},
-        remarks=("what the reader must know",),
+        remarks=("what the reader must know", together),
     )  # fmt: skip
+
+
+def _means(own, bearing, sides):
+    """(cells, 4): on the last bearing at the cells' ranges, at rest; the last cell is given up."""
+    angle = np.radians(bearing[-1])
+    away = np.outer(np.tile(RANGE_M, sides), [np.cos(angle), np.sin(angle)])
+    mean = np.hstack([own[-1] + away, 0.0 * away])
+    mean[-1] = np.nan
+    return mean
 
 
 def states():

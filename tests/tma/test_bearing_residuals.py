@@ -9,11 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import signal, stats
 
 from boresight.experiments.scenario import lookup
 from boresight.filters.batch import batch_map, velocity_prior
 from boresight.target_motion.contact import Contact
+from boresight.target_motion.faults import compass
 from boresight.target_motion.fit import Fit, delay_slopes, fitted
 from boresight.target_motion.residuals import judge, whiteness
 
@@ -181,6 +182,80 @@ def test_errors_of_neighbours_that_are_alike_are_told():
     assert "smoothed" in tests["whiteness"][0].words
 
 
+def alike(r):
+    """Noise whose neighbours have the correlation r: a first-order autoregression."""
+
+    def made(normals):
+        first = normals[:, :1] / np.sqrt(1.0 - r * r)
+        b, a = [np.sqrt(1.0 - r * r)], [1.0, -r]
+        return signal.lfilter(b, a, np.hstack([first, normals[:, 1:]]), axis=1)
+
+    return made
+
+
+def test_errors_that_are_alike_raise_no_alarm_of_anything_else():
+    """1 % each and of 300: more than 3.3 % once in 1,000. Counted as independent, over 5 %."""
+    tests = judged(bearings(), runs=300, seed=13, noise=alike(0.5))
+    for name in ("noise level", "outliers", "own ship's clock", "compass", "steady target"):
+        assert failed(tests[name]) <= 10 / 300, name
+    assert failed(tests["whiteness"]) == 1.0
+    score = np.array([each.estimate / each.sd for each in tests["own ship's clock"]])
+    assert abs(score.std() - 1.0) < 0.15
+
+
+def test_a_fault_is_seen_through_errors_that_are_alike():
+    tests = judged(bearings(delay_s=4.0), runs=30, seed=14, noise=alike(0.5))
+    assert failed(tests["own ship's clock"]) > 0.9
+
+
+@pytest.mark.parametrize("level", [1.0, 0.5])
+def test_smoothed_bearings_are_judged_by_nothing_but_their_likeness(level):
+    def smoothed(n):
+        slow = alike(0.99)(alike(0.99)(n))
+        return level * slow / slow.std()
+
+    tests = judged(bearings(turned_deg=0.3, delay_s=1.0), runs=30, seed=15, noise=smoothed)
+    for name in ("outliers", "own ship's clock", "compass", "steady target"):
+        assert not any(each.asked for each in tests[name])
+        assert all(each.passed and each.estimate is None for each in tests[name])
+    assert failed(tests["noise level"]) == 0.0
+    assert failed(tests["whiteness"]) == 1.0
+    assert all("cannot be judged" in each.words for each in tests["whiteness"])
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        ({"delay_s": 3.0}, "own ship's clock"),
+        ({"acceleration": (0.004, 0.0)}, "steady target"),
+        ({"turned_deg": 2.0}, "compass"),
+    ],
+)
+def test_what_fails_through_another_fault_is_told_to_follow_from_it(fault, name):
+    tests = judged(bearings(**fault), runs=40, seed=16)
+    assert np.mean([not each.passed and each.follows is None for each in tests[name]]) > 0.8
+    others = [each for other in NAMES if other != name for each in tests[other] if not each.passed]
+    assert len(others) > 40
+    assert np.mean([each.follows == name for each in others]) > 0.8
+    passed = [each for kind in NAMES for each in tests[kind] if each.passed]
+    assert not any(each.follows for each in passed)
+
+
+def test_no_compass_is_off_by_a_right_angle():
+    one, mean = recording(bearings()), np.array([*target([800.0])[0], -7.725, 13.38])
+    noise = SIGMA * np.random.default_rng(17).standard_normal(801)
+    for turned_deg, words in ((10.0, "too much, all alike"), (60.0, "beyond 30°")):
+        found = compass(fitted(one, mean, noise + np.radians(turned_deg)), 0.01)
+        assert not found.test.passed
+        assert words in found.test.words
+        assert found.test.estimate == pytest.approx(turned_deg, abs=0.6)
+        assert found.is_possible == (turned_deg < 30.0)
+    early = fitted(one, mean, np.where(one.time_s < 40.0, noise, np.nan))
+    muted = compass(early, 0.01).test
+    assert not muted.asked
+    assert muted.passed
+
+
 def test_single_bearings_that_are_wrong_are_counted_and_named():
     def spoilt(n):
         n = n.copy()
@@ -290,6 +365,8 @@ def test_a_delay_without_a_turn_is_not_asked_and_few_bearings_are_not_judged():
     asked = {each.name: each for each in found.tests}
     assert asked["own ship's clock"].words.startswith("Not asked")
     assert asked["own ship's clock"].passed
+    assert not asked["own ship's clock"].asked
+    assert asked["noise level"].asked
     noise[0, 6:] = np.nan
     few = judge(one, SimpleNamespace(residual=noise, mean=mean))
     assert few.tests == ()

@@ -1,7 +1,6 @@
 """The work of `boresight tma`: read, analyse, write down, answer."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,17 +10,16 @@ from boresight.interfaces import door, screens_tma
 from boresight.interfaces.answers import Answer
 from boresight.interfaces.contacts import tma
 from boresight.interfaces.recordings import sha256
+from boresight.interfaces.report.tma_facts import told
 from boresight.interfaces.terminal import Manner, progress
 
 if TYPE_CHECKING:
     import polars as pl
 
-    from boresight.target_motion.result import Batch, Residuals, Side, TargetMotion, TmaResult
+    from boresight.target_motion.result import TargetMotion, TmaResult
 
 REPORT, TARGET = "report.html", "target.geojson"
 HISTORY, HISTORY_CSV = "history.parquet", "history.csv"
-STATE = ("north_m", "east_m", "north_mps", "east_mps")
-QUANTITIES = ("range_m", "bearing_deg", "course_deg", "speed_mps")
 
 
 def analyse(
@@ -98,49 +96,3 @@ def content(found: "TmaResult", outputs: Sequence[str]) -> dict[str, Any]:
         "remarks": [*found.remarks, *answers[0]["remarks"]],
         "outputs": list(outputs),
     }
-
-
-def told(one: "TargetMotion") -> dict[str, Any]:
-    """One contact's answer, as JSON holds it."""
-    seen = asdict(one.observability)
-    del seen["by_step"], seen["observable"]
-    return {
-        "track": one.contact.name,
-        "filter": one.filter,
-        "bearings": one.bearings,
-        "first_s": float(one.contact.time_s[0]),
-        "last_s": float(one.contact.time_s[-1]),
-        "observable": one.observable,
-        "observability": seen,
-        "converged_s": one.converged_s,
-        "convergence": asdict(one.convergence),
-        "criteria": asdict(one.criteria),
-        **{name: asdict(getattr(one, name)) for name in QUANTITIES},
-        "state": {"names": STATE, "mean": one.mean, "cov": one.cov} if one.observable else None,
-        "plane": asdict(one.contact.site) if one.contact.site else None,
-        "sides": [_side(each) for each in one.sides],
-        "side_decided": one.decided,
-        "cells": {
-            "range_m": one.cells.range_m,
-            "side": one.cells.side,
-            "weights": one.cells.weights[-1],
-        },
-        "batch": _batch(one.batch) if one.batch and one.observable else None,
-        "residuals": _residuals(one.residuals) if one.residuals else None,
-        "settings": one.settings,
-        "remarks": [*one.contact.remarks, *one.remarks],
-    }
-
-
-def _side(side: "Side") -> dict[str, Any]:
-    return asdict(side)
-
-
-def _batch(batch: "Batch") -> dict[str, Any]:
-    told = {name: asdict(getattr(batch, name)) for name in QUANTITIES}
-    return {"cost": batch.cost, "settled": batch.converged, **told}
-
-
-def _residuals(residuals: "Residuals") -> dict[str, Any]:
-    tests = [asdict(each) for each in residuals.tests]
-    return {"false_alarm": residuals.false_alarm, "tests": tests}

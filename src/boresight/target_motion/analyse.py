@@ -19,6 +19,7 @@ from boresight.models.checks import not_negative, positive
 from boresight.models.motion import ConstantVelocity
 from boresight.target_motion.contact import Contact
 from boresight.target_motion.convergence import check_criteria, converge
+from boresight.target_motion.doubts import of_limits, of_residuals, of_spread
 from boresight.target_motion.observability import observe
 from boresight.target_motion.quantities import QUANTITIES, as_polar, describe, history
 from boresight.target_motion.residuals import judge
@@ -128,7 +129,11 @@ def analyse(
         batch=_batch(contact, fit) if fit.converged[0] and seen.observable else None,
         residuals=residuals,
         settings=_settings(chosen, spread, belief),
-        remarks=_doubts(answer.range_m, spread, residuals),
+        remarks=(
+            *of_spread(past["range_sd_m"][-1], bound[-1, 0]),
+            *of_limits(answer.range_m, spread),
+            *of_residuals(residuals),
+        ),
     )
 
 
@@ -216,7 +221,7 @@ def _cells(bank: Bank, spread: RangeParameterised | None) -> Cells:
     """The bank's cells; a single filter has one, of no range of its own."""
     sides = len(np.unique(bank.side))
     ranges = np.repeat(spread.ranges[0], sides) if spread else np.full(1, np.nan)
-    return Cells(range_m=ranges, side=bank.side, weights=bank.weights)
+    return Cells(range_m=ranges, side=bank.side, weights=bank.weights, mean=bank.means[-1, :, :4])
 
 
 def _batch(contact: Contact, fit: BatchEstimate) -> Batch:
@@ -241,23 +246,3 @@ def _settings(chosen: Filter, spread: RangeParameterised, belief: Belief) -> dic
     limits = {"nearest_m": spread.nearest_m, "farthest_m": spread.farthest_m}
     bank = asdict(spread) if chosen.name in BANKS else limits
     return {"filter": chosen.name, **asdict(belief), **bank}
-
-
-def _doubts(
-    range_m: Quantity,
-    spread: RangeParameterised,
-    residuals: Residuals | None,
-) -> tuple[str, ...]:
-    """What contradicts itself in the answer, and what the residuals say against it."""
-    said = [test.words for test in residuals.tests if not test.passed] if residuals else []
-    region = range_m.regions.get("90", ())
-    if region and (region[-1][1] < spread.nearest_m or region[0][0] > spread.farthest_m):
-        said.append(
-            f"The range comes out at {region[0][0]:,.0f} to {region[-1][1]:,.0f} m, outside the "
-            f"{spread.nearest_m:,.0f} to {spread.farthest_m:,.0f} m that were believed possible: "
-            "either these limits are wrong, or the contact does not keep its course and speed "
-            "(own ship's own noise, for one, turns with it)."
-        )
-    if residuals is None:
-        said.append("No steady track fits the bearings well enough for a batch estimate to settle.")
-    return tuple(said)

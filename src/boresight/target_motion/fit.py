@@ -1,4 +1,8 @@
-"""The best straight track's residuals as those of a linear regression, and slopes along faults."""
+"""The best straight track's residuals as those of a linear regression, and slopes along faults.
+
+[bartlett1935] M. S. Bartlett, "Some Aspects of the Time-Correlation Problem in Regard to Tests of
+Significance": of errors that are alike, fewer count.
+"""
 
 from typing import Any, NamedTuple
 
@@ -7,6 +11,7 @@ import numpy as np
 from boresight.target_motion.contact import Contact
 
 Array = Any
+_NOTHING = 1e-6  # of a slope's length: what is left of it when the track explains all of it
 
 
 class Fit(NamedTuple):
@@ -19,6 +24,7 @@ class Fit(NamedTuple):
         basis: (m, rank) orthonormal columns: what it can explain.
         across: (m, 2) slopes of each bearing with the target's North and East, in sigma per m.
         side: (m,) 1 for a bearing and right of the array's axis, -1 left of it.
+        alike: correlation of neighbouring errors that tests must reckon with; 0 for independent.
     """
 
     time_s: Array
@@ -27,11 +33,47 @@ class Fit(NamedTuple):
     basis: Array
     across: Array
     side: Array
+    alike: float = 0.0
 
     @property
     def dof(self) -> int:
         """Residuals that are free."""
         return len(self.rest) - int(self.basis.shape[1])
+
+    @property
+    def stretch(self) -> float:
+        """How many such bearings tell as much of a slow change as one of independent error.
+
+        Of a first-order autoregression [bartlett1935]; it is too many where errors of bearings
+        further apart are less alike than that.
+        """
+        return (1.0 + self.alike) / (1.0 - self.alike)
+
+    @property
+    def worth(self) -> float:
+        """How many independent residuals tell as much of a slow change."""
+        return self.dof / self.stretch
+
+    def without(self, slopes: Array) -> "Fit":
+        """The same if what slopes (m, k) can explain is taken off as well."""
+        more, _, _ = self.free(slopes)
+        return self._replace(
+            rest=self.rest - more @ (more.T @ self.rest), basis=np.hstack([self.basis, more])
+        )
+
+    def free(self, slopes: Array) -> tuple[Array, Array, Array]:
+        """Parts of slopes (m, k) that the track cannot explain, as a singular value decomposition.
+
+        Returns:
+            (m, rank), (rank,), (rank, k): of slopes that are of length one before.
+        """
+        size = np.linalg.norm(slopes, axis=0)
+        unit = slopes / np.where(size > 0.0, size, 1.0)
+        left, values, right = np.linalg.svd(
+            unit - self.basis @ (self.basis.T @ unit), full_matrices=False
+        )
+        kept = values > _NOTHING
+        return left[:, kept], values[kept], right[kept]
 
 
 def fitted(contact: Contact, mean: Array, residual: Array) -> Fit:

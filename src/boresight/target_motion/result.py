@@ -112,7 +112,10 @@ class Test:
         p_value: how often chance alone gives as much.
         passed: whether that is at least the false-alarm rate.
         words: one sentence for a reader, with figures.
-        estimate, sd: of what is asked, where that is a size (degrees, seconds); None where not.
+        estimate, sd: of what is asked, where that is a size (degrees, seconds, a correlation);
+            None where not.
+        asked: whether these bearings can answer it; one that is not asked counts as passed.
+        follows: the failed test whose fault would explain that this one failed; None for itself.
     """
 
     name: str
@@ -122,6 +125,8 @@ class Test:
     words: str
     estimate: float | None = None
     sd: float | None = None
+    asked: bool = True
+    follows: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,11 +152,14 @@ class Cells:
         range_m: (cells,) the middles they started from.
         side: (cells,) -1 port, 0 where sides are known, 1 starboard.
         weights: (steps, cells).
+        mean: (cells, 4) where each has the target at the last bearing: North, East (m), their
+            rates (m/s); NaN where it is given up.
     """
 
     range_m: Array
     side: Array
     weights: Array
+    mean: Array
 
 
 @dataclass(frozen=True, kw_only=True)

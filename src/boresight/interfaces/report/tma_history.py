@@ -172,6 +172,7 @@ def _value_axis(kind: Kind, low: Floats, high: Floats, point: Floats) -> Chart:
         bottom, top = middle - half, middle + half
         return axis | {"range": [bottom, top], **_turned(bottom, top)}
     margin = 0.04 * (top - bottom) + 1e-6
+    bottom = 0.0 if bottom < top / 2.0 else bottom  # a distance is judged from nothing
     return axis | {"range": [max(bottom - margin, 0.0), top + margin]}
 
 

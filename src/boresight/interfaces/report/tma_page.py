@@ -1,8 +1,8 @@
 """What target motion analysis puts on the page: each contact, what is known of it and what not."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from boresight.interfaces.report import (
     tma_cells,
@@ -14,6 +14,7 @@ from boresight.interfaces.report import (
 )
 from boresight.interfaces.report.residuals import Panel
 from boresight.interfaces.report.sections import Block, Part, Tile, points
+from boresight.interfaces.report.tma_facts import told
 from boresight.interfaces.report.tma_tables import count, stem
 from boresight.interfaces.report.tma_verdict import sentences, summary
 from boresight.interfaces.report.tma_view import View
@@ -46,7 +47,7 @@ def part(result: "TmaResult") -> Part:
     """Return the part of the page about target motion: of one contact, or of many."""
     one = len(result.contacts) == 1
     drawn = _drawn(View(result.main), is_alone=True) if one else _several(result)
-    said = (*result.remarks, *(_remarks(result.main) if one else ()))
+    said = (*result.remarks, *(result.main.contact.remarks if one else ()))
     return Part(
         kind="target motion",
         title=f"Contact {result.main.contact.name}" if one else "Contacts",
@@ -58,12 +59,8 @@ def part(result: "TmaResult") -> Part:
         settings=("How it was analysed", result.main.settings),
         charts={each.name: each.chart for each in drawn.panels},
         series=None,
-        facts={"contacts": [_facts(each) for each in result.contacts]},
+        facts={"contacts": [told(each) for each in result.contacts]},
     )
-
-
-def _remarks(motion: "TargetMotion") -> tuple[str, ...]:
-    return (*motion.contact.remarks, *motion.remarks)
 
 
 def _drawn(view: View, *, is_alone: bool) -> Drawn:
@@ -141,7 +138,7 @@ def _details(motion: "TargetMotion", place: int, drawn: Drawn) -> str:
     said = f"{count(motion.bearings, 'bearing')}; {tma_tables.known(motion)}"
     places = {each.name for each in drawn.blocks if each.html}
     verdict = f'<div id="{name}verdict">{points(sentences(motion, name), places)}</div>'
-    notes = "".join(f"<li>{escape(each)}</li>" for each in _remarks(motion))
+    notes = "".join(f"<li>{escape(each)}</li>" for each in motion.contact.remarks)
     inside = "".join(
         f'<div class="block" id="{each.name}"><h3>{each.title}</h3>{each.html}</div>'
         for each in drawn.blocks
@@ -165,33 +162,12 @@ def _tiles(motion: "TargetMotion") -> tuple[Tile, ...]:
 
 def _counts(result: "TmaResult") -> tuple[Tile, ...]:
     every = result.contacts
-    told = sum(each.observable for each in every)
+    known = sum(each.observable for each in every)
     good = sum(each.converged_s is not None for each in every)
     sides = sum(bool(each.sides) and not each.decided for each in every)
     return (
         Tile("contacts", figure(len(every)), count(sum(e.bearings for e in every), "bearing")),
-        Tile("range told", figure(told), "by bearings alone"),
+        Tile("range told", figure(known), "by bearings alone"),
         Tile("good enough", figure(good), "to the end"),
         Tile("side open", figure(sides), "port and starboard possible"),
     )
-
-
-def _facts(motion: "TargetMotion") -> dict[str, Any]:
-    """Return what the page says of a contact, for machines."""
-    return dict(_plain(motion))
-
-
-def _plain(motion: "TargetMotion") -> Iterator[tuple[str, Any]]:
-    from dataclasses import asdict
-
-    yield "contact", motion.contact.name
-    for name in ("filter", "bearings", "observable", "converged_s", "decided", "settings"):
-        yield name, getattr(motion, name)
-    seen = asdict(motion.observability)
-    yield "observability", {name: seen[name] for name in seen if name != "by_step"}
-    for name in ("convergence", "criteria", *(kind.name for kind in KINDS)):
-        yield name, asdict(getattr(motion, name))
-    yield "sides", [asdict(side) for side in motion.sides]
-    tests = motion.residuals.tests if motion.residuals else ()
-    yield "tests", [asdict(test) for test in tests]
-    yield "remarks", _remarks(motion)

@@ -1,7 +1,7 @@
 """The geographic picture of one contact: North up, equal scales, own ship and what it heard."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,21 +21,28 @@ CAPTION = (
 TOLD = " Blue: the track since the bearings tell the range, with ellipses of two sd."
 BATCH = " Dashed: the straight track that fits all bearings best."
 SIDES = " Both sides of the array are drawn: it hears a cone."
-CELLS = " Rings on the first bearing: where the cells that are left began, larger for more weight."
+CELLS = (
+    " Thin, ending in a ring: tracks that fit the bearings, one of each cell that is left, with a "
+    "larger ring for more weight."
+)
+FITTING = "tracks that fit"
 LINES, ARROWS, ELLIPSES = 14, 9, 6
 TWO_SD = 2.0
 WIDTHS = {"99": 4, "90": 9, "50": 15}
 FADE = {"99": 0.45, "90": 0.45, "50": 0.6}
 SIDE_RGB = {"starboard": "213,94,0", "port": "138,79,125"}
-WEIGHTLESS = 1e-3  # a cell that holds less is left out
+CELL_RGB = {0: "0,114,178", 1: "213,94,0", -1: "138,79,125"}
+WEIGHTLESS = 1e-2  # a cell that holds less is left out
+TICKS = 9  # at most, along the longer axis
 
 
 def panel(view: View) -> Panel:
     """Draw the picture of one contact."""
     data = [*_bearings(view), *_cells(view), *_batch(view), *_target(view), *_regions(view)]
     data += _own_ship(view)
-    axes = {"xaxis": charts.axis("East, km")}
-    axes |= {"yaxis": charts.axis("North, km", scaleanchor="x")}
+    step = _step(view)
+    axes = {"xaxis": charts.axis("East, km", dtick=step)}
+    axes |= {"yaxis": charts.axis("North, km", scaleanchor="x", dtick=step)}
     layout = charts.layout(**axes, showlegend=True, dragmode="pan")
     alt = f"map of own ship, bearings and estimated track of contact {view.title}"
     return Panel(f"{view.stem}picture-chart", {"data": data, "layout": layout}, alt)
@@ -43,10 +50,9 @@ def panel(view: View) -> Panel:
 
 def caption(view: View) -> str:
     """Say what the picture shows of this contact."""
-    motion = view.motion
     said = [CAPTION, TOLD if _known(view).any() else ""]
     said += [BATCH if _has_batch(view) else "", SIDES if view.open_sides else ""]
-    return "".join([*said, CELLS if len(motion.cells.range_m) > 1 else ""])
+    return "".join([*said, CELLS if len(_left(view)) else ""])
 
 
 def _known(view: View) -> NDArray[np.bool_]:
@@ -73,20 +79,41 @@ def _own_ship(view: View) -> list[Chart]:
 
 
 def _bearings(view: View) -> Iterator[Chart]:
-    """Draw some of the bearings as heard, as far as the range may be; a cone has two."""
-    heard = sides_heard(view)
-    known = np.flatnonzero(np.isfinite(heard).any(axis=0))
+    """Draw some of the bearings as heard, to the track or as far as the range may be."""
+    (east, north), (far_east, far_north) = _own(view), _far(view)
+    known = np.flatnonzero(np.isfinite(far_east).any(axis=0))
     if not len(known):
         return
     at = known[thinned(len(known), LINES)]
-    reach = _reach(view) / 1e3
-    angle = np.radians(heard[:, at].ravel())
-    east, north = (np.tile(each[at], len(heard)) for each in _own(view))
-    gap = np.full_like(angle, np.nan)
-    x = np.stack([east, east + reach * np.sin(angle), gap], 1).ravel()
-    y = np.stack([north, north + reach * np.cos(angle), gap], 1).ravel()
+    far_east, far_north = far_east[:, at], far_north[:, at]
+    gap = np.full_like(far_east, np.nan)
+    near_east, near_north = (np.broadcast_to(each[at], gap.shape) for each in (east, north))
+    x = np.stack([near_east, far_east, gap], -1).ravel()
+    y = np.stack([near_north, far_north, gap], -1).ravel()
     style = {"line": {"color": "rgba(91,102,117,0.38)", "width": 1}, "hoverinfo": "skip"}
     yield line(x, y, charts.GRID, name="bearings") | style
+
+
+def _far(view: View) -> tuple[Floats, Floats]:
+    """(1 or 2, kept) where bearings are drawn to, km: a cone has two until a side is decided."""
+    heard = sides_heard(view)
+    if view.motion.sides and view.motion.decided:
+        heard = heard[[int(view.motion.sides[0].name == "port")]]
+    (east, north), angle = _own(view), np.radians(heard)
+    away = np.full(len(east), _reach(view) / 1e3)
+    if _has_batch(view):
+        track = _batch_track(view)
+        away = 1.04 * np.hypot(track[0] - east, track[1] - north)
+    return east + away * np.sin(angle), north + away * np.cos(angle)
+
+
+def _step(view: View) -> float:
+    """Distance between the lines of the grid, km: the same on both axes, 1, 2 or 5 of a power."""
+    drawn = zip(_own(view), _far(view), strict=True)
+    spans = [np.ptp(each[np.isfinite(each)]) for each in (np.append(*both) for both in drawn)]
+    rough = max(*spans, 1e-3) / TICKS
+    power = 10.0 ** np.floor(np.log10(rough))
+    return float(power * next(each for each in (1, 2, 5, 10) if each * power >= rough))
 
 
 def sides_heard(view: View) -> Floats:
@@ -111,25 +138,38 @@ def _reach(view: View) -> float:
     return 1.04 * max((end for end in ends if np.isfinite(end)), default=10e3)
 
 
+def _left(view: View) -> NDArray[np.intp]:
+    """Return the cells that are still possible, while the bearings do not tell which is right."""
+    cells, motion = view.motion.cells, view.motion
+    if len(cells.range_m) < 2 or (motion.observable and not view.open_sides):
+        return np.empty(0, dtype=np.intp)
+    heavy = np.asarray(cells.weights)[-1] > WEIGHTLESS
+    return np.flatnonzero(heavy & np.isfinite(cells.mean).all(axis=-1))
+
+
 def _cells(view: View) -> Iterator[Chart]:
-    """Mark where the bank's cells began, on the first bearing, by what they weigh now."""
-    cells, heard = view.motion.cells, sides_heard(view)
-    first = np.flatnonzero(np.isfinite(heard[0]))
-    if len(cells.range_m) < 2 or not len(first):
-        return
-    weight = np.asarray(cells.weights)[-1]
-    weight = np.where(weight > WEIGHTLESS, weight, np.nan)
-    side = np.where(np.asarray(cells.side) < 0, len(heard) - 1, 0)
-    angle = np.radians(heard[side, first[0]])
-    east, north = (each[first[0]] for each in _own(view))
-    away = np.where(np.isfinite(weight), cells.range_m, np.nan) / 1e3
-    x, y = east + away * np.sin(angle), north + away * np.cos(angle)
-    size = 4 + 14 * np.sqrt(np.clip(weight, 0, 1))
-    style = {"symbol": "circle-open", "line": {"width": 1.4}}
-    trace = dots(x, y, charts.MUTED, size=floats(np.nan_to_num(size)), opacity=0.8, **style)
-    hover = "cell at %{customdata[0]:.2f} km, weight %{customdata[1]:.2g}<extra></extra>"
-    rows = list(zip(floats(away), floats(weight), strict=True))
-    yield trace | {"customdata": rows, "hovertemplate": hover, "name": "cells' first ranges"}
+    """Draw the straight track of each cell that is left: all of them fit what was heard."""
+    left, side = _left(view), np.asarray(view.motion.cells.side)
+    for place, each in enumerate(np.unique(side[left])):
+        tracks, rings = _tracks(view, left[side[left] == each], CELL_RGB[int(each)])
+        yield tracks | {"showlegend": place == 0}
+        yield rings
+
+
+def _tracks(view: View, at: NDArray[np.intp], rgb: str) -> tuple[Chart, Chart]:
+    """Draw tracks back to the first bearing, and rings where they end."""
+    cells, back = view.motion.cells, float(view.time[-1] - view.time[0])
+    mean, weight = np.asarray(cells.mean)[at] / 1e3, np.asarray(cells.weights)[-1, at]
+    now, then = mean[:, :2], mean[:, :2] - back * mean[:, 2:]
+    north, east = np.stack([then, now, np.nan * now], axis=1).reshape(-1, 2).T
+    style = {"line": {"color": f"rgba({rgb},0.5)", "width": 1}, "hoverinfo": "skip"}
+    tracks = line(east, north, charts.BLUE, name=FITTING) | style
+    size = floats(4.0 + 14.0 * np.sqrt(weight))
+    hollow: dict[str, Any] = {"symbol": "circle-open", "line": {"width": 1.4}}
+    rings = dots(now[:, 1], now[:, 0], f"rgb({rgb})", size=size, **hollow)
+    rows = list(zip(floats(np.asarray(cells.range_m)[at] / 1e3), floats(weight), strict=True))
+    hover = "began at %{customdata[0]:.3g} km, weight %{customdata[1]:.2g}<extra></extra>"
+    return tracks, rings | {"customdata": rows, "hovertemplate": hover}
 
 
 def _regions(view: View) -> Iterator[Chart]:
@@ -172,12 +212,18 @@ def _has_batch(view: View) -> bool:
 def _batch(view: View) -> Iterator[Chart]:
     if not _has_batch(view):
         return
-    batch = view.motion.batch
-    assert batch is not None  # noqa: S101 - asked a line above
-    back = view.time[-1] - view.time
-    north, east = (batch.mean[i] / 1e3 - back * batch.mean[i + 2] / 1e3 for i in (0, 1))
     style = {"color": charts.GREEN, "width": 1.6, "dash": "dash"}
+    east, north = _batch_track(view)
     yield line(east, north, charts.GREEN, name="batch estimate", line=style, hoverinfo="skip")
+
+
+def _batch_track(view: View) -> tuple[Floats, Floats]:
+    """(kept,) East and North of the batch estimate, km."""
+    batch = view.motion.batch
+    assert batch is not None  # noqa: S101 - `_has_batch` was asked
+    back = view.time[-1] - view.time
+    north, east = ((batch.mean[i] - back * batch.mean[i + 2]) / 1e3 for i in (0, 1))
+    return east, north
 
 
 def _target(view: View) -> Iterator[Chart]:

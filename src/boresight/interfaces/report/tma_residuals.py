@@ -54,7 +54,7 @@ def _over_time(view: View, deg: Floats, sd: Floats) -> charts.Chart:
     hover = {"hovertemplate": "%{y:.3f}° at %{x:,.7~g} s<extra></extra>"}
     reach = 1.1 * max(float(np.nanmax(np.abs(deg))), 2.2 * float(np.median(sd)))
     y = charts.axis("residual, °", range=[-reach, reach], zeroline=True, zerolinecolor="#aab4c0")
-    x = time_axis(showgrid=False)
+    x = time_axis(showgrid=False, range=[float(time[0]), float(time[-1])])
     data = [*band(time, -2 * sd, 2 * sd, "two sd"), trace | hover]
     return {"data": data, "layout": charts.layout(xaxis=x, yaxis=y)}
 
@@ -89,8 +89,8 @@ def words(view: View) -> str:
     rows = [
         [
             text_cell(test.name),
-            Cell(figure(test.statistic, 3), is_figure=True),
-            Cell(_chance(test.p_value), is_figure=True),
+            Cell(figure(test.statistic, 3) if test.asked else "–", is_figure=True),
+            Cell(_chance(test), is_figure=True),
             Cell(_finding(test)),
             text_cell(test.words),
         ]
@@ -101,16 +101,17 @@ def words(view: View) -> str:
     )
 
 
-def asked(test: "Test") -> bool:
-    """Whether the bearings could answer a test at all; one that chance always passes asks none."""
-    return test.p_value < 1.0
-
-
 def _finding(test: "Test") -> str:
-    if not asked(test):
+    if not test.asked:
         return "not asked"
-    return "passed" if test.passed else "<b>failed</b>"
+    if test.passed:
+        return "passed"
+    return f"failed, as {test.follows} would explain" if test.follows else "<b>failed</b>"
 
 
-def _chance(p_value: float) -> str:
-    return "&lt; 0.0001" if p_value < 1e-4 else f"{p_value:.2g}"
+def _chance(test: "Test") -> str:
+    if not test.asked:
+        return "–"
+    if test.p_value < 1e-4:
+        return "&lt; 0.0001"
+    return f"{test.p_value:.2f}" if test.p_value >= 0.1 else f"{test.p_value:.1g}"

@@ -1,6 +1,6 @@
 """The tables of target motion: every contact in a line, and one contact's quantities."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -31,29 +31,39 @@ def contacts(every: "Sequence[TargetMotion]", linked: Container[int]) -> str:
         every: the contacts.
         linked: places of those that the page shows in detail.
     """
-    heads = ["contact", "bearings", "heard, s", "range", "range, 90 %", "bearing", "course"]
-    heads += ["speed", "side", "good since", "what is known"]
-    rows = [_contact(each, place, linked) for place, each in enumerate(every)]
-    caption = f"{len(every):,} contacts, most bearings first"
-    return table(caption, heads, rows, name="contacts-table", sortable=True)
-
-
-def _contact(motion: "TargetMotion", place: int, linked: Container[int]) -> list[Cell]:
-    name, time = escape(motion.contact.name), motion.contact.time_s
-    link = f'<a href="#{stem(place)}verdict">{name}</a>' if place in linked else name
-    since = motion.converged_s
-    return [
-        Cell(link, motion.contact.name),
-        number_cell(motion.bearings),
-        Cell(f"{time[0]:,.6g} to {time[-1]:,.6g}", f"{time[0]:.9g}", is_figure=True),
-        _figure(RANGE, motion.range_m),
-        Cell(hull(RANGE, motion.range_m) or "–", is_figure=True),
-        _bearing(motion),
-        *(_figure(kind, getattr(motion, kind.name)) for kind in (COURSE, SPEED)),
-        text_cell(_side(motion)),
-        Cell(f"{since:,.6g} s" if since is not None else "–", f"{since or ''}", is_figure=True),
-        text_cell(known(motion)),
+    columns = [(name, [cell(each) for each in every]) for name, cell in COLUMNS.items()]
+    links = [
+        Cell(_link(each, place, linked), each.contact.name) for place, each in enumerate(every)
     ]
+    shown = [("contact", links)]
+    shown += [
+        (head, cells) for head, cells in columns if any(each.html != NONE.html for each in cells)
+    ]
+    caption = f"{len(every):,} contacts, most bearings first"
+    heads, cells = zip(*shown, strict=True)
+    return table(caption, heads, zip(*cells, strict=True), name="contacts-table", sortable=True)
+
+
+def _link(motion: "TargetMotion", place: int, linked: Container[int]) -> str:
+    name = escape(motion.contact.name)
+    return f'<a href="#{stem(place)}verdict">{name}</a>' if place in linked else name
+
+
+def _since(motion: "TargetMotion") -> Cell:
+    since = motion.converged_s
+    return NONE if since is None else Cell(f"{since:,.6g} s", f"{since}", is_figure=True)
+
+
+def _time(motion: "TargetMotion", place: int) -> Cell:
+    time = motion.contact.time_s[place]
+    return Cell(f"{time:,.7g}", f"{time:.9g}", is_figure=True)
+
+
+def _within(motion: "TargetMotion") -> Cell:
+    """The range's region; it sorts by its far end, which is what little knowledge leaves open."""
+    pieces = motion.range_m.regions.get("90", ())
+    key = f"{pieces[-1][1]:.9g}" if pieces else ""
+    return Cell(hull(RANGE, motion.range_m) or NONE.html, key, is_figure=True)
 
 
 def stem(place: int) -> str:
@@ -70,13 +80,30 @@ def _bearing(motion: "TargetMotion") -> Cell:
     """The bearing, or those of both sides while both are possible."""
     if not motion.sides or motion.decided:
         return _figure(BEARING, motion.bearing_deg)
-    return Cell(" or ".join(estimate(BEARING, side.bearing_deg) for side in motion.sides))
+    both = " or ".join(estimate(BEARING, side.bearing_deg) for side in motion.sides)
+    first = motion.sides[0].bearing_deg.estimate
+    return Cell(both, "" if first is None else f"{first:.9g}")
 
 
-def _side(motion: "TargetMotion") -> str:
+def _side(motion: "TargetMotion") -> Cell:
     if not motion.sides:
-        return ""
-    return motion.sides[0].name if motion.decided else "either"
+        return NONE
+    return text_cell(motion.sides[0].name if motion.decided else "either")
+
+
+def failures(motion: "TargetMotion") -> list[str]:
+    """Names of the failed tests of the residuals, without those that follow from another."""
+    tests = motion.residuals.tests if motion.residuals else ()
+    return [test.name for test in tests if not test.passed and not test.follows]
+
+
+def _residuals(motion: "TargetMotion") -> Cell:
+    if motion.residuals is None:
+        return Cell("no track fits")
+    if not motion.residuals.tests:
+        return Cell("too few")
+    failed = ", ".join(map(escape, failures(motion)))
+    return Cell(f"fails: {failed}" if failed else "in order")
 
 
 def known(motion: "TargetMotion") -> str:
@@ -123,3 +150,19 @@ def _lines(words: str) -> str:
 def count(number: int, word: str) -> str:
     """Render `1 bearing`, `12 bearings`."""
     return f"{figure(number)} {word}{'' if number == 1 else 's'}"
+
+
+COLUMNS: "dict[str, Callable[[TargetMotion], Cell]]" = {
+    "bearings": lambda motion: number_cell(motion.bearings),
+    "from, s": lambda motion: _time(motion, 0),
+    "to, s": lambda motion: _time(motion, -1),
+    "what is known": lambda motion: text_cell(known(motion)),
+    "range": lambda motion: _figure(RANGE, motion.range_m),
+    "range, 90 %": _within,
+    "bearing": _bearing,
+    "side": _side,
+    "course": lambda motion: _figure(COURSE, motion.course_deg),
+    "speed": lambda motion: _figure(SPEED, motion.speed_mps),
+    "good since": _since,
+    "residuals": _residuals,
+}

@@ -1,12 +1,12 @@
 """What is known of a contact and what is not, in plain words, with what would decide it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
 from boresight.interfaces.report.residuals import column
-from boresight.interfaces.report.tma_residuals import asked
+from boresight.interfaces.report.tma_tables import failures
 from boresight.interfaces.report.tma_words import (
     BEARING,
     COURSE,
@@ -20,12 +20,12 @@ from boresight.interfaces.report.tma_words import (
 )
 from boresight.interfaces.report.verdict import Sentence
 from boresight.interfaces.report.words import figure
+from boresight.target_motion.doubts import is_too_sure, of_residuals
 
 if TYPE_CHECKING:
     from boresight.target_motion.result import Criteria, TargetMotion, TmaResult
 
 FEW = 10  # bearings
-TOO_SURE = 0.5  # of the bound: a smaller sd is a fault, not luck
 DOUBT = (
     "What is said of range, course and speed holds for a steady target on a straight track and for "
     "the stated noise. These residuals speak against that: take it, and its sd, with reserve."
@@ -42,7 +42,7 @@ def sentences(motion: "TargetMotion", stem: str = "") -> list[Sentence]:
     """
     parts = (
         _range(motion),
-        _surer(motion),
+        _doubts(motion),
         _sides(motion),
         _motion(motion),
         _converged(motion),
@@ -91,28 +91,20 @@ def _why(motion: "TargetMotion") -> str:
     )
 
 
-def _surer(motion: "TargetMotion") -> Iterator[Sentence]:
-    """Warn of a filter that states less than the bearings and the belief can have told it."""
-    if _too_sure(motion):
-        own, bound = _range_sd(motion), _range_bound(motion)
-        text = (
-            f"<b>The filter is too sure of itself:</b> it states the range to an sd of "
-            f"{figure(own, 2)} m, and no method could have it below {figure(bound, 2)} m (the "
-            "Cramér-Rao bound with the same belief). Its regions are too narrow."
-        )
-        yield Sentence("attention", text, "history")
+def _doubts(motion: "TargetMotion") -> Iterator[Sentence]:
+    """Say what speaks against the answer."""
+    of_bearings = of_residuals(motion.residuals)
+    for words in motion.remarks:
+        link = "residuals" if words in of_bearings else "history"
+        yield Sentence("attention", escape(words), link)
+    tests = motion.residuals.tests if motion.residuals else ()
+    if not all(test.passed for test in tests):
+        yield Sentence("attention", DOUBT, "residuals")
 
 
 def _too_sure(motion: "TargetMotion") -> bool:
-    return _range_sd(motion) < TOO_SURE * _range_bound(motion)
-
-
-def _range_sd(motion: "TargetMotion") -> float:
-    return float(column(motion.history, RANGE.sd)[-1])
-
-
-def _range_bound(motion: "TargetMotion") -> float:
-    return float(column(motion.history, RANGE.bound)[-1])
+    sd, bound = (column(motion.history, name)[-1] for name in (RANGE.sd, RANGE.bound))
+    return is_too_sure(float(sd), float(bound))
 
 
 def _sides(motion: "TargetMotion") -> Iterator[Sentence]:
@@ -168,6 +160,8 @@ def _converged(motion: "TargetMotion") -> Iterator[Sentence]:
         if when.permitted_s is not None
         else "The Cramér-Rao bound does not permit it on these bearings."
     )
+    if (when.permitted_s or 0.0) > (when.sustained_s or math.inf):
+        bound += " Until then the filter was surer than can be counted on."
     if when.sustained_s is not None:
         first = "" if when.first_s in (None, when.sustained_s) else _first(when.first_s)
         text = f"<b>Good enough since {seconds(when.sustained_s)}</b>{first}: {limits}. {bound}"
@@ -214,14 +208,9 @@ def _batch(motion: "TargetMotion") -> Iterator[Sentence]:
 def _residuals(motion: "TargetMotion") -> Iterator[Sentence]:
     if motion.residuals is None:
         return
-    failed = [test for test in motion.residuals.tests if not test.passed]
-    for test in failed:
-        yield Sentence("attention", escape(test.words), "residuals")
-    if failed:
-        yield Sentence("attention", DOUBT, "residuals")
-    count = sum(map(asked, motion.residuals.tests))
-    if count and not failed:
-        text = f"The residuals of a straight track pass all {count} tests that can be asked."
+    asked = [test for test in motion.residuals.tests if test.asked]
+    if asked and all(test.passed for test in asked):
+        text = f"The residuals of a straight track pass all {len(asked)} tests that can be asked."
         yield Sentence("good", text, "residuals")
 
 
@@ -234,29 +223,47 @@ def _few(motion: "TargetMotion") -> Iterator[Sentence]:
 def summary(result: "TmaResult") -> list[Sentence]:
     """Return the verdict of a file of several contacts."""
     every = result.contacts
-    told = sum(each.observable for each in every)
-    good = sum(each.converged_s is not None for each in every)
-    still = sum(not each.observability.manoeuvred for each in every)
-    open_sides = sum(bool(each.sides) and not each.decided for each in every)
-    found = [
-        Sentence(
-            "good" if told == len(every) else "attention",
-            f"<b>The range of {told} of {len(every)} contacts can be told.</b> "
-            + (
-                f"Own ship did not manoeuvre while it heard {still} of them: no method "
-                "could tell their range from bearings alone."
-                if still
-                else ""
-            ),
-            "contacts",
-        ),
-        Sentence(
-            "good" if good == len(every) else "note",
-            f"{good} of {len(every)} are good enough to the end: {criteria(every[0].criteria)}.",
-            "contacts",
-        ),
+    return [
+        each for part in (_told(every), _good(every), _open(every), _odd(every)) for each in part
     ]
-    if open_sides:
-        text = f"For <b>{open_sides} contacts both sides of the array are still possible.</b>"
-        found.append(Sentence("attention", text, "contacts"))
-    return found
+
+
+def _told(every: "Sequence[TargetMotion]") -> Iterator[Sentence]:
+    told = sum(each.observable for each in every)
+    still = sum(not each.observability.manoeuvred for each in every)
+    whom = "any" if still == len(every) else f"{still}"
+    why = (
+        f" Own ship did not manoeuvre while it heard {whom} of them: no method could tell their "
+        "range from bearings alone."
+    )
+    text = f"<b>The range of {told or 'none'} of the {len(every)} contacts can be told.</b>"
+    mark = "good" if told == len(every) else "attention"
+    yield Sentence(mark, text + (why if still else ""), "contacts")
+
+
+def _good(every: "Sequence[TargetMotion]") -> Iterator[Sentence]:
+    good = sum(each.converged_s is not None for each in every)
+    count = f"{good} of {len(every)} are" if good else "None is"
+    text = f"{count} good enough to the end: {criteria(every[0].criteria)}."
+    yield Sentence("good" if good == len(every) else "note", text, "contacts")
+
+
+def _open(every: "Sequence[TargetMotion]") -> Iterator[Sentence]:
+    count = sum(bool(each.sides) and not each.decided for each in every)
+    if count:
+        whom = f"all {count}" if count == len(every) else f"{count}"
+        text = f"For <b>{whom} contacts both sides of the array are still possible.</b>"
+        yield Sentence("attention", text, "contacts")
+
+
+def _odd(every: "Sequence[TargetMotion]") -> Iterator[Sentence]:
+    """Count the contacts whose residuals speak against a straight track, by what fails."""
+    failed = [name for each in every for name in failures(each)]
+    if failed:
+        kinds = ", ".join(f"{name} {failed.count(name)}" for name in dict.fromkeys(failed))
+        odd = sum(bool(failures(each)) for each in every)
+        text = (
+            f"The residuals of {odd} contacts speak against a steady target heard with the stated "
+            f"noise, by what fails: {escape(kinds)}."
+        )
+        yield Sentence("attention", text, "contacts")

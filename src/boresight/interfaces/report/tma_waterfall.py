@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from html import escape
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from boresight.interfaces.report.tma_view import (
     text,
     thinned,
     time_axis,
+    unwrapped,
 )
 
 CAPTION = (
@@ -34,7 +36,7 @@ CONE = (
 MOST_DOTS = 12_000  # of all contacts together
 NAMED = 12  # more names than these hide the picture
 STANDING_MPS = 0.05  # slower, own ship has no heading that its velocity tells
-STEPS_DEG = (1, 2, 5, 10, 15, 30, 45)
+STEPS_DEG = (1, 2, 5, 10, 15, 30, 45, 90)
 COLORS = (charts.BLUE, charts.ORANGE, charts.GREEN, charts.PURPLE, "#b58900", "#56B4E9", "#3b4a5c")
 
 
@@ -42,21 +44,44 @@ def panel(views: Sequence[View], name: str = "waterfall-chart") -> Panel:
     """Draw the waterfall of one contact or of all."""
     cut, is_alone = _cut(views), len(views) == 1
     time, heading, axis = _own_ship(views)
-    data = [_line(heading, time, cut, charts.MUTED, "own ship's heading", "dash")]
+    strip = _strip(heading, time) if is_alone and not np.isfinite(axis).any() else None
+    data = (
+        strip.data
+        if strip
+        else [_line(heading, time, cut, charts.MUTED, "own ship's heading", "dash")]
+    )
     if np.isfinite(axis).any():
         data.append(_line(axis, time, cut, charts.MUTED, "array's axis", "dot"))
         data.append(_line(axis + 180.0, time, cut, charts.MUTED, "array's axis, astern", "dot"))
     step = -(-sum(len(view.kept) for view in views) // MOST_DOTS) or 1
     for view, color in zip(views, _colors(len(views)), strict=True):
         data += _alone(view, cut, color) if is_alone else _among(view, cut, color, step)
-    every = [heading, *(view["bearing_deg"] for view in views)]
+    every = [*([] if strip else [heading]), *(view["bearing_deg"] for view in views)]
     every += [sides_heard(view).ravel() for view in views]
     x = charts.axis("bearing, °", side="top", **_ticks(_placed(np.concatenate(every), cut)))
     layout = charts.layout(xaxis=x, yaxis=time_axis(autorange="reversed"), showlegend=is_alone)
+    if strip:
+        layout["xaxis"]["domain"], layout["xaxis2"] = [0.0, 0.76], strip.axis
     layout["legend"] = layout["legend"] | {"y": -0.02, "yanchor": "top"}
     layout["annotations"] = [] if is_alone else _names(views, cut)
     who = f"contact {views[0].title}" if is_alone else f"{len(views)} contacts"
     return Panel(name, {"data": data, "layout": layout}, f"bearings of {who} over time")
+
+
+class _Strip(NamedTuple):
+    """A narrow chart beside the bearings, on their axis of time."""
+
+    data: list[Chart]
+    axis: Chart
+
+
+def _strip(heading: Floats, time: Floats) -> _Strip:
+    """Draw own ship's heading beside true bearings, which need all the width for themselves."""
+    turned = unwrapped(heading)
+    style = {"color": charts.MUTED, "width": 1.4, "dash": "dash"}
+    drawn = line(turned, time, charts.MUTED, name="own ship's heading", line=style, xaxis="x2")
+    axis = charts.axis("heading, °", side="top", domain=[0.82, 0.97], **_ticks(turned, 3))
+    return _Strip([drawn | {"hoverinfo": "skip"}], axis)
 
 
 def caption(views: Sequence[View]) -> str:
@@ -150,13 +175,13 @@ def _names(views: Sequence[View], cut: float) -> list[Chart]:
     return found
 
 
-def _ticks(every: Floats) -> Chart:
+def _ticks(every: Floats, most: int = 9) -> Chart:
     """Return range and ticks of the axis of bearings, read 0 to 360."""
     every = every[np.isfinite(every)]
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 360.0)
     margin = 0.03 * (high - low) + 1.0
     low, high = low - margin, high + margin
-    step = next((each for each in STEPS_DEG if (high - low) / each <= 9), STEPS_DEG[-1])
+    step = next((each for each in STEPS_DEG if (high - low) / each <= most), STEPS_DEG[-1])
     ticks = np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step
     words = [f"{each % 360:03.0f}" for each in ticks]
     return {"range": [low, high], "tickvals": floats(ticks), "ticktext": words}
