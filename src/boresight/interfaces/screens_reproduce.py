@@ -83,15 +83,18 @@ def _beside(
 
 
 def _rows(heads: tuple[str, ...], rows: list[tuple[str, Mapping[str, Any]]], width: int) -> "Table":
-    """A column for each name; where they are too wide, a line of names and values each."""
-    cells = [[_value(value, DIGITS) for value in row.values()] for _, row in rows]
-    needed = sum(2 + max(map(len, column)) for column in zip(heads, *cells, strict=True))
-    if needed + _LABEL > width:
-        return _beside({}, dict(rows), {})
-    grid = _grid("", *heads)
-    for (name, _), line in zip(rows, cells, strict=True):
-        grid.add_row(name, *line)
-    return grid
+    """A column for each name, or a row where these are too wide, or a line of all each."""
+    lines = [(name, *(_value(value, DIGITS) for value in row.values())) for name, row in rows]
+    upright: list[tuple[str, ...]] = [("", *heads), *lines]
+    lying = list(zip(*upright, strict=True))
+    for table, columns in ((upright, lying), (lying, upright)):
+        needed = sum(2 + max(map(len, column)) for column in columns[1:])
+        if needed <= width - _LABEL:
+            grid = _grid(*table[0])
+            for line in table[1:]:
+                grid.add_row(*line)
+            return grid
+    return _beside({}, dict(rows), {})
 
 
 def _grid(*heads: str, folds: bool = False) -> "Table":

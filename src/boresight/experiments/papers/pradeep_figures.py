@@ -14,10 +14,13 @@ import numpy as np
 from boresight.experiments.papers.figures import Drawing, draw, sheet
 from boresight.experiments.papers.pradeep_study import NEAR, Study
 from boresight.experiments.papers.pradeep_tracked import QUANTITIES, Tracked, own_ship
+from boresight.experiments.papers.pradeep_truths import BEYOND
 from boresight.experiments.papers.pradeep_words import rms
 
 Array = Any
-_INK = {"RP": "tab:red", "MGEKF": "tab:blue", "EKF": "tab:green", NEAR: "tab:cyan"}
+# Colours that are told apart without red and green (M. Okabe and K. Ito).
+_INK = {"RP": "#d55e00", "MGEKF": "#0072b2", "EKF": "#009e73", NEAR: "#56b4e9"}
+_KM = 1e-3
 _BESIDE = ("o", "x")  # markers of what filters are held against
 _EARLY_S = 300.0  # what happens when own ship turns is over
 
@@ -51,15 +54,18 @@ def _tracks(study: Study, label: str) -> tuple[Any, dict[str, Array]]:
         label: one.estimate.mean[run, :, :2],
     }
     figure, axes = sheet(
-        1, 2, f"{label}: the run that converges at {one.converged[run]:.0f} s", (6.2, 3.6)
+        1, 2, f"{label}: the run that converges at {one.converged[run]:.0f} s", (6.0, 3.5)
     )
     early = study.at(_EARLY_S)
     for place, last in ((axes[0, 0], len(seconds) - 1), (axes[0, 1], early)):
         _ways(place, ways, label, last, study.at(one.converged[run]))
         _view(place, [ways["own ship"][: last + 1], ways["target"][: last + 1]])
-        place.set_title(f"{seconds[0]:.0f} to {seconds[last]:.0f} s", fontsize="small")
+        place.set_title(f"{seconds[0]:.0f} to {seconds[last]:.0f} s")
     _bearing_lines(axes[0, 1], study, run, early)
-    axes[0, 0].legend(fontsize="small")
+    named = [zip(*place.get_legend_handles_labels()[::-1], strict=True) for place in axes[0]]
+    shown = dict(named[0]) | dict(named[1])
+    axes[0, 0].legend(shown.values(), shown.keys(), fontsize="small", loc="lower left")
+    _finish(axes)
     columns = {"time_s": seconds}
     for name, way in ways.items():
         columns |= {f"{name} north_m": way[:, 0], f"{name} east_m": way[:, 1]}
@@ -71,21 +77,25 @@ def _ways(place: Any, ways: Mapping[str, Array], label: str, last: int, converge
     for name, way in ways.items():
         shown = way[: last + 1]
         wide = 3.0 if name == "target" else 1.2
-        place.plot(shown[:, 1], shown[:, 0], color=ink[name], linewidth=wide, label=name)
+        place.plot(*_east_north(shown), color=ink[name], linewidth=wide, label=name)
         if name != label:
-            place.plot(shown[0, 1], shown[0, 0], "o", color=ink[name], markersize=4)
+            place.plot(*_east_north(shown[:1]), "o", color=ink[name], markersize=4)
     if converged <= last:
-        north, east = ways[label][converged]
-        place.plot(east, north, "D", color=_INK[label], markersize=5, label="converged")
-    place.set(xlabel="East, m", ylabel="North, m", aspect="equal")
-    place.grid(alpha=0.3)
+        spot = _east_north(ways[label][converged][None])
+        place.plot(*spot, "D", color=_INK[label], markersize=5, label="converged")
+    place.set(xlabel="East, km", ylabel="North, km", aspect="equal")
+
+
+def _east_north(way: Array) -> tuple[Array, Array]:
+    """Both in km, of (points, 2) North and East."""
+    return _KM * way[:, 1], _KM * way[:, 0]
 
 
 def _view(place: Any, shown: list[Array]) -> None:
     """The axes hold own ship and target; an estimate may run out of them."""
-    points = np.concatenate(shown)
+    points = _KM * np.concatenate(shown)
     low, high = points.min(axis=0), points.max(axis=0)
-    room = 0.15 * np.max(high - low)
+    room = 0.12 * np.max(high - low)
     place.set(ylim=(low[0] - room, high[0] + room), xlim=(low[1] - room, high[1] + room))
 
 
@@ -94,8 +104,9 @@ def _bearing_lines(place: Any, study: Study, run: int, last: int) -> None:
     own, z = own_ship(study.world), study.simulated[1].z[run, :, 0]
     for k in range(study.at(30.0), last + 1, max(study.at(30.0), 1)):
         far = 6_000.0 * np.array([np.cos(z[k]), np.sin(z[k])])
-        (north, east), (north_2, east_2) = own[k], own[k] + far
-        place.plot([east, east_2], [north, north_2], color="tab:gray", linewidth=0.5, alpha=0.6)
+        label = "bearings, every 30 s" if k == study.at(30.0) else None
+        line = _east_north(np.stack([own[k], own[k] + far]))
+        place.plot(*line, color="tab:gray", linewidth=0.5, alpha=0.6, label=label)
 
 
 def _error(study: Study, quantity: str) -> tuple[Any, dict[str, Array]]:
@@ -112,16 +123,22 @@ def _error(study: Study, quantity: str) -> tuple[Any, dict[str, Array]]:
         columns |= {f"{label} run {run} {plain}": lines[0], f"{label} RMS {plain}": lines[1]}
     for side in (limit, -limit):
         axes[0, 0].plot(study.time_s, side, "k:", linewidth=0.8)
-    axes[0, 0].set(ylim=(-3 * limit.max(), 3 * limit.max()), title="one run; dotted: tolerated")
+    axes[0, 0].set(
+        ylim=(-3 * limit.max(), 3 * limit.max()), ylabel=f"error of the {quantity}, {unit}"
+    )
+    axes[0, 0].set_title("each in the run of its median convergence; dotted: tolerated")
     bound = study.bound_sd[:, i]
-    axes[0, 1].plot(study.time_s, bound, "k--", linewidth=1.0, label="Cramér-Rao bound")
-    axes[0, 1].set(yscale="log", title=f"root mean square of {study.runs} runs")
+    axes[0, 1].plot(
+        study.time_s, bound, "k--", linewidth=1.0, label="Cramér-Rao bound, with the start's spread"
+    )
+    axes[0, 1].set(yscale="log", ylabel=f"root mean square error, {unit}")
+    _plain_decades(axes[0, 1].yaxis)
+    axes[0, 1].set_title(f"{study.runs} runs; grey: own ship turns")
     for place in axes[0]:
         _turns(place, study)
         place.set(xlabel="time, s", xlim=(study.time_s[0], study.time_s[-1]))
-        place.title.set_fontsize("small")
-        place.grid(alpha=0.3)
         place.legend(fontsize="small")
+    _finish(axes)
     return figure, columns | {f"bound {plain}": bound, f"limit {plain}": limit}
 
 
@@ -142,7 +159,9 @@ def _turns(place: Any, study: Study) -> None:
 def _times(study: Study) -> tuple[Any, dict[str, Array]]:
     """PR-C1: when runs converge, and how good estimates are then."""
     shown = {label: study.tracked[label] for label in ("RP", "MGEKF", NEAR)}
-    figure, axes = sheet(1, 2, f"Convergence for good, {study.runs} runs", (5.2, 3.8))
+    near = f"{study.assumed['near_start_m']:g} ± {study.assumed['near_start_sd_m']:g} m"
+    title = f"Convergence for good, {study.runs} runs; near: {near}; grey: own ship turns"
+    figure, axes = sheet(1, 2, title, (5.2, 3.8))
     latest = max(float(np.max(one.converged)) for one in shown.values())
     for label, one in shown.items():
         share = np.mean(one.converged[:, None] <= study.time_s, axis=0)
@@ -152,11 +171,11 @@ def _times(study: Study) -> tuple[Any, dict[str, Array]]:
     for label, one in shown.items():
         axes[0, 1].hist(one.converged, bins=bins, color=_INK[label], histtype="step", label=label)
     axes[0, 1].axvline(study.converge_s, color="black", linestyle=":", label="Table 5.1")
-    axes[0, 1].set(xlim=(100.0, latest + 10.0), xlabel="time, s", ylabel="runs")
+    axes[0, 1].set(xlim=(100.0, latest + 10.0), xlabel="time, s", ylabel="runs in 5 s")
     for place in axes[0]:
         _turns(place, study)
-        place.grid(alpha=0.3)
         place.legend(fontsize="small")
+    _finish(axes)
     columns = {f"{label}, s": one.times[1] for label, one in shown.items()}
     return figure, {"run": np.arange(study.runs)} | columns
 
@@ -169,10 +188,10 @@ def _anywhere(study: Study) -> tuple[Any, dict[str, Array]]:
     near = study.truths["RP"].closest_m
     for label, ratio in reversed(found.items()):
         axes[0, 0].plot(near, ratio, ".", color=_INK[label], markersize=3, label=label, alpha=0.6)
-    axes[0, 0].axhline(5.0, color="black", linestyle=":", linewidth=0.8)
-    axes[0, 0].set(xscale="log", yscale="log", xlabel="nearest to own ship, m",
-                   ylabel="error over bound at the end")  # fmt: skip
-    axes[0, 0].set_title(f"{len(near)} random truths; dotted: five times the bound")
+    axes[0, 0].axhline(BEYOND, color="black", linestyle=":", linewidth=0.8)
+    axes[0, 0].set(xscale="log", yscale="log", xlabel="target's nearest to own ship, m",
+                   ylabel="error of the position over bound, at the end")  # fmt: skip
+    axes[0, 0].set_title(f"{len(near)} random targets; dotted: {BEYOND:g} times the bound")
     for label in ("RP", "MGEKF", "EKF", NEAR):
         ratio = rms(np.sqrt(study.tracked[label].square)) / study.bound_m
         axes[0, 1].plot(study.time_s, ratio, color=_INK[label], linewidth=1.1, label=label)
@@ -186,9 +205,8 @@ def _anywhere(study: Study) -> tuple[Any, dict[str, Array]]:
     axes[0, 1].set_xlim(0.0, study.time_s[-1])
     _turns(axes[0, 1], study)
     for place in axes[0]:
-        place.title.set_fontsize("small")
-        place.grid(alpha=0.3)
         place.legend(fontsize="small")
+    _finish(axes)
     return figure, {"nearest_m": near} | {f"{label} over bound": r for label, r in found.items()}
 
 
@@ -201,21 +219,37 @@ def _weights(study: Study) -> tuple[Any, dict[str, Array]]:
     figure, axes = sheet(1, 3, f"Mean weights of the cells, {study.runs} runs", (4.6, 3.8))
     for place, kind in zip(axes[0], list(kinds)[:2], strict=False):
         _cells(place, study, kinds[kind])
-        place.set(title=kind, xlabel="time, s", ylabel="mean weight", ylim=(0.0, 1.0))
+        place.set(xlabel="time, s", ylabel="mean weight", ylim=(0.0, 1.0))
+        place.set_title(kind)
         place.set_xlim(0.0, study.time_s[-1])
     axes[0, 0].set_xlim(0.0, _EARLY_S)
     _turns(axes[0, 0], study)
     _bars(axes[0, 2], study)
     axes[0, 1].legend(fontsize="x-small", title="cell", ncols=2, title_fontsize="x-small")
-    for place in axes[0]:
-        place.title.set_fontsize("small")
-        place.grid(alpha=0.3)
+    _finish(axes)
     columns = {
         f"{kind} cell {i + 1}": weights[:, i]
         for kind, weights in kinds.items()
         for i in range(weights.shape[1])
     }
     return figure, {"time_s": study.time_s} | columns
+
+
+def _plain_decades(axis: Any) -> None:
+    """Ticks at 1, 2 and 5 of each decade, written out."""
+    from matplotlib.ticker import LogLocator
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")
+
+
+def _finish(axes: Array) -> None:
+    """Letters to name the panels by, small titles, thin grids."""
+    for letter, place in zip("abc", axes[0], strict=False):
+        place.set_title(f"({letter}) {place.get_title()}".rstrip(), fontsize="small", loc="left")
+        place.title.set_text("")
+        place.grid(alpha=0.3)
 
 
 def _shade(i: int, cells: int) -> str:
@@ -239,10 +273,11 @@ def _bars(place: Any, study: Study) -> None:
     for i in range(cells):
         heights = [found[k, i] for _, found in groups]
         spots = np.arange(len(groups)) + (i - (cells - 1) / 2) * 0.8 / cells
-        place.bar(spots, heights, width=0.8 / cells, color=_shade(i, cells))
+        edge = "black" if i == study.true_cell else "none"
+        place.bar(spots, heights, width=0.8 / cells, color=_shade(i, cells), edgecolor=edge)
     place.set_xticks(range(len(groups)), [f"{sd:g}" for sd, _ in groups])
     place.set(
         xlabel="spread of velocity at the start, m/s",
         ylabel="mean weight",
-        title=f"at {study.before:g} s: what was put in comes out",
+        title=f"at {study.before:g} s, by what is believed; outlined: the target's cell",
     )
