@@ -44,12 +44,11 @@ def truth(steps):
 
 @pytest.mark.parametrize("steps", [241, 401, 801])
 def test_what_is_told_is_as_sure_as_it_says(steps):
-    """At 240, 400 and 800 s, 1,000 runs each: about 100 s a time.
+    """At 240, 400 and 800 s, 1,000 other runs each: about 100 s a time.
 
-    Of a normal error 95.4 % are within two spreads. The share has a standard error of 0.66 %, so it
-    leaves 93 to 97 % once in 120; one of three independent numbers a time (speed follows range),
-    at three times that see mostly the same bearings' noise anew, does once in about 15. The seed
-    is fixed.
+    Of a normal error 95.4 % are within two spreads, and a share of 1,000 has a standard error of
+    0.66 %: good spreads leave 93 to 97 % once in 120. With three independent numbers a time (speed
+    follows range) and three times, one of nine does once in 14; the seeds are fixed.
     """
     answers = [analyse(each, CHOSEN) for each in contacts(OWN, 1_000, seed=90 + steps, steps=steps)]
     assert all(each.observable for each in answers)
