@@ -18,16 +18,23 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import faults
+import faults_bearings
 import faults_calibration
 import faults_filters
 import faults_registration
+import faults_tables
 import faults_tma
 from faults import Fault
 
 ROOT = Path(__file__).resolve().parents[1]
-_TABLES = (faults, faults_filters, faults_calibration, faults_registration, faults_tma)
+_TABLES = (
+    faults, faults_filters, faults_calibration, faults_registration, faults_tma, faults_bearings,
+    faults_tables,
+)  # fmt: skip
 FAULTS = tuple(fault for table in _TABLES for fault in table.FAULTS)
-_JUDGED = faults_calibration.JUDGES | faults_registration.JUDGES | faults_tma.JUDGES
+_JUDGED = {
+    prefix: names for table in _TABLES for prefix, names in getattr(table, "JUDGES", {}).items()
+}
 
 
 def _tests(*names: str) -> tuple[str, ...]:
@@ -73,6 +80,7 @@ JUDGES = {
 }
 # What is compiled is judged so; of long recursions that is the quicker way too.
 _LONG = ("filters/error_", "mixtures/", "filters/mgekf", "filters/fisher", "filters/batch")
+_LONG += ("filters/reversible", "target_motion/observability")
 COMPILED = (KERNELS, *(JUDGES[prefix] for prefix in _LONG))
 WANTED = 0.9
 PATIENCE_S = 900

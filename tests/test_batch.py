@@ -182,6 +182,20 @@ def test_the_lowest_cost_wins_whatever_the_order_of_the_starts():
     assert np.all(in_sds(one.mean - other.mean, one.cov) < 1e-6)
 
 
+def test_a_start_is_where_the_track_ends():
+    """Without a step; what comes before the first bearing does not count."""
+    z, starts = noisy(2), np.tile(LAST + np.array([40.0, -30.0, 0.5, -0.25]), (2, 1, 1))
+    ours = fit(z, starts=starts, iterations=0)
+    np.testing.assert_allclose(ours.mean, starts[:, 0], rtol=1e-12)
+    np.testing.assert_allclose(
+        ours.first[:, :2], starts[:, 0, :2] - 300.0 * starts[:, 0, 2:], rtol=1e-12
+    )
+    late = DT + 77.0 * np.eye(1, STEPS)
+    sensor = heard.bearings_from(OWN[:, ::-1])
+    again = batch.batch_map(z, heard.straight(), sensor, late, prior=PRIOR, starts=starts)
+    assert np.array_equal(again.mean, fit(z, starts=starts).mean)
+
+
 def test_says_when_it_has_not_settled():
     z = noisy(2)
     assert not fit(z, iterations=1).converged.any()

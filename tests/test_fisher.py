@@ -141,6 +141,14 @@ def test_what_is_not_heard_tells_nothing():
     assert relative_difference(some, F.T @ alone[0, -1] @ F) < 1e-10
 
 
+def test_what_comes_before_the_first_bearing_does_not_matter():
+    args = heard.straight(), sensor_at(OWN)
+    late, ears = DT + 60.0 * np.eye(1, 801), np.ones((1, 801, 1))
+    prior = np.diag(np.array([3000.0, 2500.0, 11.0, 9.0]) ** -2.0)
+    found = fisher.fisher_information(TARGET[None], *args, late, ears, prior=prior)[0]
+    assert np.array_equal(found, information(OWN, prior=prior))
+
+
 def test_every_component_by_itself():
     both = Radar(range_m=30.0, azimuth_deg=0.33, pose=Pose(position_m=heard.up(heard.OWN)))
     ears = np.ones((1, 801, 2), dtype=bool)
@@ -216,6 +224,8 @@ def test_refuses_what_it_cannot_do():
         fisher.fisher_information(args[0], by_step, *args[2:])
     with pytest.raises(UsageError, match="backwards"):
         check_reversible(OneWay(), 1.0)
+    with pytest.raises(UsageError, match="without noise"):
+        check_reversible(heard.straight(0.1), 0.0)  # a single plot has no step
 
 
 class OneWay(ConstantVelocity):

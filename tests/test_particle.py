@@ -160,6 +160,16 @@ def test_renewed_particles_keep_mean_and_covariance():
     assert len(np.unique(new[0])) == COUNT
 
 
+def test_renewed_particles_are_spread_as_silverman_says():
+    """About each of two values, in one dimension: (4 / 3n)^(1/5); at 5 standard errors."""
+    random = np.random.default_rng(SEED)
+    places, weights = np.where(np.arange(COUNT) % 2, 1.0, -1.0)[None], np.full(COUNT, 1.0 / COUNT)
+    new = _Renewal(0.5, 1.0)(places, weights, random)[0]
+    width = (4.0 / (3.0 * COUNT)) ** 0.2
+    assert np.std(np.abs(new)) == pytest.approx(width, rel=5.0 / np.sqrt(2 * COUNT))
+    assert np.mean(np.abs(new)) == pytest.approx(np.sqrt(1.0 - width**2), abs=5e-3)
+
+
 def test_a_plot_that_no_particle_explains_leaves_their_weights():
     z = plots(1)
     z[0, 3] = 1e160  # its square is infinite

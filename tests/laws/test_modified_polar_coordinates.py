@@ -125,6 +125,52 @@ def test_a_wide_start_has_the_moments_of_uniform_ranges():
     np.testing.assert_allclose(state["cov"] / np.outer(scale, scale), expected, atol=0.03)
 
 
+def test_a_start_whose_velocity_goes_with_its_range_has_the_moments_of_draws():
+    """400,000 lognormal ranges; of one over a uniform range the variance is another."""
+    u, *rest = np.random.default_rng(6).normal(size=(4, 400_000))
+    log_sd = np.sqrt(np.log(1.04))
+    r = 5e3 * np.exp(log_sd * u - log_sd**2 / 2.0)
+    along, across = 8.0 + 4.0 * u + 3.0 * rest[0], -3.0 - 2.0 * u + 3.0 * rest[1]
+    plane = np.stack([r, 5.0 * rest[2], along, across])
+    start = Gaussian(plane.mean(axis=1), np.cov(plane))
+    state = ModifiedPolar().begin(start, STRAIGHT, heard_from((0.0, 0.0)))
+    drawn = np.stack([across / r, along / r, 5.0 * rest[2] / r.mean(), 1.0 / r])
+    scale = np.std(drawn, axis=1)
+    np.testing.assert_allclose(state["mean"] / scale, drawn.mean(axis=1) / scale, atol=0.03)
+    apart = (state["cov"] - np.cov(drawn)) / np.outer(scale, scale)
+    np.testing.assert_allclose(apart.ravel()[:-1], 0.0, atol=0.03)
+
+
+def test_a_wide_prediction_has_the_spread_of_its_cubature_points():
+    """Plus and minus two columns of the root, each moved in the plane."""
+    own, velocity, later, dt = np.array([2e3, -1e3]), np.array([6.0, 8.0]), [2.2e3, -8.4e2], 20.0
+    cov = np.diag([2e-3, 1.5e-3, 0.02, 3e-5]) ** 2
+    kept = np.array([1e-3, -2e-3, 0.6, 1.5e-4])
+    state = {"mean": kept, "cov": cov, "position": own, "velocity": velocity}
+    points = kept + np.concatenate([2.0 * np.sqrt(cov), -2.0 * np.sqrt(cov)])
+    moved = []
+    for turn, rate, bearing, inverse in points:
+        ahead = np.array([np.cos(bearing), np.sin(bearing)])
+        aside = np.array([-ahead[1], ahead[0]])
+        v = velocity + (rate * ahead + turn * aside) / inverse
+        there = np.array([*(own + ahead / inverse + dt * v), *v])
+        moved.append(by_definition(there, np.array(later), (later - own) / dt))
+    expected = np.cov(np.array(moved).T, ddof=0)
+    found = ModifiedPolar().predict(state, STRAIGHT, heard_from(later), dt)
+    scale = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(found["mean"] / scale, np.mean(moved, axis=0) / scale, atol=1e-9)
+    np.testing.assert_allclose(found["cov"] / np.outer(scale, scale),
+                               expected / np.outer(scale, scale), atol=1e-9)  # fmt: skip
+
+
+def test_a_bearing_through_south_is_kept_within_half_a_turn():
+    method, sensor = ModifiedPolar(), heard_from((0.0, 0.0))
+    state = method.begin(Gaussian(np.array([-1e3, 5.0, 0.0, -10.0]), TINY), STRAIGHT, sensor)
+    moved = method.predict(state, STRAIGHT, sensor, 1.0)
+    assert state["mean"][2] == pytest.approx(np.pi - 5e-3, abs=1e-6)
+    assert moved["mean"][2] == pytest.approx(-np.pi + 5e-3, abs=1e-4)
+
+
 @given(seed=seeds, ratio=st.floats(0.01, 3.0))
 def test_any_start_is_kept_with_a_covariance(seed, ratio):
     """However wide its range, and however correlated."""
@@ -212,8 +258,10 @@ def test_filters_that_need_a_range_say_which_does_not(name):
     assert "rp-ekf" in str(caught.value)
 
 
-@pytest.mark.parametrize("inverse", [1e-9, -1e-3, 2e-5, 1e-4])
-def test_what_is_told_is_positive_definite_however_little_is_known_of_the_range(inverse):
+@pytest.mark.parametrize(
+    ("inverse", "range_m"), [(1e-9, 2e5), (-1e-3, 2e5), (2e-5, 5e4), (1e-4, 1e4)]
+)
+def test_what_is_told_is_positive_definite_however_little_is_known_of_the_range(inverse, range_m):
     """Known to a tenth of a metre per second across the line of sight, and not at all along it."""
     sensor, own = heard_from((3e3, -4e3)), {"position": np.array([3e3, -4e3]), "velocity": [5.0, 2]}
     cov = np.diag([5e-7, 5e-6, 2e-3, 5.0]) ** 2
@@ -222,6 +270,7 @@ def test_what_is_told_is_positive_definite_however_little_is_known_of_the_range(
     along = np.array([np.cos(0.7), np.sin(0.7)])
     assert along @ told.cov[:2, :2] @ along == pytest.approx(2e5**2, rel=1e-6)
     far = np.linalg.norm(told.mean[:2] - own["position"])
+    assert far == pytest.approx(range_m)
     assert along[::-1] * [-1, 1] @ told.cov[:2, :2] @ (along[::-1] * [-1, 1]) == pytest.approx(
         (2e-3 * far) ** 2, rel=1e-3
     )

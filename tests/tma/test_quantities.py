@@ -134,6 +134,18 @@ def test_a_mean_of_bearings_on_either_side_of_north_is_north():
     assert sd[1] == pytest.approx(np.hypot(np.degrees(np.arctan(0.2)), np.degrees(0.01)), rel=0.01)
 
 
+def test_a_mean_of_directions_is_that_of_the_angles_and_not_of_their_vectors():
+    """Nine tenths on 0 and one on 60 degrees: the vectors' mean points to 5.2, the angles' is 6."""
+    narrow, slow = ellipse(1, 1, 0), ellipse(1e-2, 1e-2, 0)
+    turn = np.array([0.5, np.sqrt(0.75)])
+    mix = mixture(
+        (9, (1_000, 0), narrow, (10, 0), slow), (1, 1_000 * turn, narrow, 10 * turn, slow)
+    )
+    estimate, sd = polar_moments(*mix, np.zeros(2))
+    assert estimate[1:3] == pytest.approx([6.0, 6.0], abs=1e-3)
+    assert sd[1:3] == pytest.approx(60.0 * np.sqrt(0.09), abs=1e-2)
+
+
 def test_cells_that_are_gone_may_hold_anything():
     weights, means, covs = SPREAD
     more = np.append(weights, 0.0)
@@ -219,6 +231,22 @@ def contact_of(steps=3):
         velocity_mps=np.zeros((steps, 2)),
         axis_rad=blank,
     )
+
+
+def test_own_ship_hears_from_where_it_was_at_that_step():
+    moved = HERE + np.array([[0.0, 0.0], [500.0, -300.0], [-100.0, 900.0]])
+    contact = replace(contact_of(), position_m=moved)
+    for step in (0, 1, 2):
+        said = describe(bank_of(FAR), contact, step, observable=True)
+        assert said.range_m.estimate == pytest.approx(polar_moments(*FAR, moved[step])[0][0])
+        assert said.range_m.regions == regions(*FAR, moved[step])["range_m"]
+
+
+def test_a_range_begins_at_zero():
+    on_a_line = mixture((1, HERE, ellipse(100, 1, 0.3), (1, 0), ellipse(1, 1, 0)))
+    past = history(bank_of(on_a_line), contact_of())
+    assert past["range_low_m"].tolist() == [0.0] * 3
+    assert past["range_high_m"] == pytest.approx(np.full(3, 180.0), rel=0.1)
 
 
 def test_without_observability_there_is_no_estimate_but_of_the_bearing():
