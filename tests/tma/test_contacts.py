@@ -219,6 +219,7 @@ def test_contacts_come_with_the_longest_first_and_short_ones_are_named():
 def test_one_bearing_makes_no_contact(count):
     with pytest.raises(DataError, match="3 bearings"):
         contacts(heard(count, sigma_deg=1.0), ship())
+    assert len(one(heard(3, sigma_deg=1.0), ship())[0].time_s) == 3
 
 
 def test_the_same_row_twice_is_taken_once():
@@ -235,6 +236,13 @@ def test_two_near_bearings_at_one_time_are_averaged():
     assert np.degrees(found.bearing_rad[50]) == pytest.approx(heard()["bearing_deg"][50] + 0.4)
     assert np.degrees(found.sigma_rad[50]) == pytest.approx(SIGMA / np.sqrt(2))
     assert said(remarks, "averaged")
+
+
+def test_two_near_bearings_on_either_side_of_south_are_averaged():
+    again = heard()[50:51].with_columns(bearing_deg=pl.lit(180.3))
+    frame = heard().with_columns(bearing_deg=pl.lit(179.9))
+    found, _ = one(pl.concat([frame, again]), ship(), sigma_deg=SIGMA)
+    assert np.degrees(found.bearing_rad[50]) == pytest.approx(180.1)
 
 
 def test_a_true_bearing_goes_before_a_cone_of_its_time():
