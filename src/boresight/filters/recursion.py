@@ -153,9 +153,9 @@ class Recursion:
         slots = tuple(Slot(name, leaf) for name, leaf in self.layout.items())
         if self.method.plain:
             return pack_states(slots, {"mean": mean, "cov": cov})
-        rated = {name: rate_of(name, *pair) for name, pair in self.models().items()}
-        rates = tuple(sorted((name, rate) for name, (rate, _) in rated.items()))
-        given = {name: _first_step(*pair) for name, pair in rated.items()}
+        first = {name: _first_step(*rate_of(name, *pair)) for name, pair in self.models().items()}
+        rates = tuple(sorted((name, rate) for name, (rate, _) in first.items()))
+        given = {name: value for name, (_, value) in first.items()}
         empty = {slot.name: np.zeros((lanes, *slot.leaf.shape)) for slot in slots}
         begun, _ = _begin_kernel(_Key(self), rates).run(
             pack_states(slots, empty), given | {"mean": mean, "cov": cov}, 1
@@ -163,11 +163,11 @@ class Recursion:
         return begun
 
 
-def _first_step(rate: Rate, value: Array) -> Array:
-    """What a number is at the first step, in the shape of its rate."""
+def _first_step(rate: Rate, value: Array) -> tuple[Rate, Array]:
+    """What a number is at the first step: one to begin with, whatever it becomes."""
     if rate is Rate.STEP:
-        return value[:1]
-    return value[:, :1] if rate is Rate.EACH else value
+        return Rate.FIXED, value[0]
+    return (Rate.LANE, value[:, 0]) if rate is Rate.EACH else (rate, value)
 
 
 class _Key:

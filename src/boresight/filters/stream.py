@@ -3,6 +3,7 @@
     step = stream(recursion)
     state = step.start(plot)
     state = step(state, plot, dt=4.0)
+    state = step(state, plot, dt=4.0, sensor=moved)  # own ship sails: the same sensor, elsewhere
 
 Nothing changes after birth: a state can be kept, branched and replayed, and the same plots give the
 same bits live as in a batch of thousands.
@@ -10,17 +11,21 @@ same bits live as in a batch of thousands.
 
 import ctypes
 import struct
+from collections.abc import Mapping
 from ctypes import addressof
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from boresight.errors import Status, UsageError
 from boresight.filters.recursion import SUMMARY, Recursion
+from boresight.filters.stream_numbers import moved, rated
 from boresight.lanes import BLOCK, Kernel, Rate, States, Symmetric
 from boresight.maths import Gaussian
 from boresight.models.checks import as_number
-from boresight.models.parameters import rate_of
+from boresight.models.parameters import structure
+from boresight.models.sensors import Sensor
 
 Array = Any
 _FOREVER = float("inf")
@@ -82,18 +87,14 @@ class Stream:
         self.recursion, self.targets = recursion, targets
         self._lanes = 1 if targets is None else targets
         self._components = len(recursion.sensor.names)
-        rated = {
-            name: rate_of(name, value, leaf) for name, (value, leaf) in recursion.models().items()
-        }
-        for name, (rate, _) in rated.items():
-            if rate & Rate.STEP:
-                raise UsageError(f"{name} changes from step to step; a stream needs one value")
-        rates = {name: rate for name, (rate, _) in rated.items()}
+        found = rated(recursion.models(), self._lanes)
+        rates = {name: rate for name, (rate, _) in found.items()}
         rates |= {"z": Rate.EACH, "dt": Rate.FIXED}
         # A method that keeps something else than it tells has the telling written beside it.
         self._written = "summary" if recursion.method.plain else "told"
         self._kernel: Kernel = recursion.kernel(rates, {self._written: Rate.LANE})
-        self._values = {name: value for name, (_, value) in rated.items()}
+        self._structure = structure(recursion.sensor)
+        self._values = {name: value for name, (_, value) in found.items()}
         self._bind()
 
     def _bind(self) -> None:
@@ -109,18 +110,32 @@ class Stream:
         names = [slot.name for slot in program.inputs]
         if names[:2] != ["z", "dt"]:
             raise AssertionError("the recursion declares the plot and dt first")
-        self._keep = [np.ascontiguousarray(self._values[n], dtype=float) for n in names[2:]]
+        self._keep = {n: np.asarray(self._values[n], order="C") for n in names[2:]}
         if code:
             # The words of a call (`Code.frame`): what never changes, packed once, around what does.
-            addresses = [array.ctypes.data for array in self._keep]
             self._head = struct.pack("4q", 0, code.chunks(self._lanes), 1, self._lanes)
             self._middle = struct.Struct("5q").pack
-            self._tail = struct.pack(f"{len(addresses)}q", *addresses)
+            self._tail = _addresses(self._keep)
             self._call = code.call
 
-    def start(self, plot: Array | Gaussian, *, speed_mps: float | None = None) -> StreamState:
-        """Begin from a plot (k,) or (targets, k), or from a Gaussian; see `run` for the speed."""
+    def start(
+        self,
+        plot: Array | Gaussian,
+        *,
+        speed_mps: float | None = None,
+        sensor: Sensor | None = None,
+    ) -> StreamState:
+        """Begin from a plot (k,) or (targets, k), or from a Gaussian.
+
+        Args:
+            plot: the first one, or what is known of the targets.
+            speed_mps: see `run`.
+            sensor: as it was at this plot; left out, the stream's own.
+        """
         recursion, prior = self.recursion, plot
+        if sensor is not None:
+            self._moved(sensor)
+            recursion = replace(recursion, sensor=sensor)
         if not isinstance(plot, Gaussian):
             rows = self._first_rows(plot)
             models = recursion.motion, recursion.sensor
@@ -156,13 +171,17 @@ class Stream:
         told[:, len(SUMMARY) : len(SUMMARY) + n] = prior.mean
         told[:, len(SUMMARY) + n :] = Symmetric(n).pack(prior.cov)
 
-    def __call__(self, state: StreamState, plot: Array, dt: float) -> StreamState:
+    def __call__(
+        self, state: StreamState, plot: Array, dt: float, *, sensor: Sensor | None = None
+    ) -> StreamState:
         """The state after dt seconds and a plot.
 
         Args:
             state: where the targets were; not changed.
             plot: (k,) or (targets, k), SI units and radians, NaN where missing.
             dt: seconds since that state, not negative.
+            sensor: as it was at this plot: another pose, other noise, the same structure. It holds
+                for this call; left out, the stream's own.
         """
         try:
             runs_forward = 0.0 <= dt < _FOREVER
@@ -180,11 +199,16 @@ class Stream:
             )
         buffer = self._buffer_type()
         self._accept(buffer, plot, dt)
+        given = self._keep if sensor is None else self._keep | self._moved(sensor)
         if self._kernel.code is None:
-            self._in_numpy(state.buffer, buffer)
+            self._in_numpy(state.buffer, buffer, given)
         else:
-            self._in_kernel(addressof(state.buffer), addressof(buffer))
+            tail = self._tail if sensor is None else _addresses(given)
+            self._in_kernel(addressof(state.buffer), addressof(buffer), tail)
         return StreamState(self, buffer)
+
+    def _moved(self, sensor: Sensor) -> dict[str, Array]:
+        return moved(sensor, self._structure, self._keep, self._lanes)
 
     def _accept(self, buffer: Any, plot: Array, dt: float) -> None:
         """Write dt and the plot behind the new state."""
@@ -200,15 +224,15 @@ class Stream:
         else:
             raise self._wrong(plot)
 
-    def _in_kernel(self, old: int, new: int) -> None:
+    def _in_kernel(self, old: int, new: int, tail: bytes) -> None:
         clock = new + self._clock_at
         varying = self._middle(old, new, new + self._summary_at, clock + 8, clock)
-        self._call(self._head + varying + self._tail)
+        self._call(self._head + varying + tail)
 
-    def _in_numpy(self, old: Any, new: Any) -> None:
+    def _in_numpy(self, old: Any, new: Any, given: dict[str, Array]) -> None:
         numbers = np.frombuffer(new)
         z = numbers[self._clock + 1 :].reshape(self._lanes, 1, self._components)
-        values = self._values | {"z": z, "dt": numbers[self._clock]}
+        values = self._values | given | {"z": z, "dt": numbers[self._clock]}
         final, outputs = self._kernel.run(self._states(old), values, 1)
         numbers[: self._state_numbers] = final.data.ravel()
         numbers[self._state_numbers : self._clock] = outputs[self._written].ravel()
@@ -245,3 +269,8 @@ class Stream:
         """An output of the last step: a number, or (targets,)."""
         column = self._rows(buffer)[:, SUMMARY.index(name)]
         return float(column[0]) if self.targets is None else column.copy()
+
+
+def _addresses(arrays: Mapping[str, Array]) -> bytes:
+    """Where the kernel finds them, as it wants it."""
+    return struct.pack(f"{len(arrays)}q", *(array.ctypes.data for array in arrays.values()))
