@@ -3,7 +3,8 @@
 [kalman1960] R. E. Kalman, "A New Approach to Linear Filtering and Prediction Problems".
 Paper: kashyap (6) to (8).
 Differs from it: the prediction takes any motion, whose Jacobian is found by dual numbers (for a
-linear motion that is the transition matrix itself); the update is in Joseph's form.
+linear motion that is the transition matrix itself); the update is in Joseph's form, and for a
+single component in one that is shorter and keeps positive at least as long.
 """
 
 from collections.abc import Sequence
@@ -29,6 +30,7 @@ from boresight.models.components import FORMULAS, Component
 from boresight.models.motion import Motion
 
 Array = Any
+_SHORT = 1.0 - 2.0**-50
 
 
 class Linear(NamedTuple):
@@ -92,6 +94,8 @@ def condition(prior: Gaussian, nu: Array, H: Array, R: Array, seen: Array) -> Po
         R: (k, k) noise covariance, rows of the identity where missing.
         seen: (k,) 1 where measured, else 0.
     """
+    if len(nu) == 1:
+        return _condition_on_one(prior, nu, H[0], R[0, 0], seen)
     mean, cov = prior
     S = mirror(H @ cov @ H.T + R)
     L, inverse = cholesky(S)
@@ -101,6 +105,24 @@ def condition(prior: Gaussian, nu: Array, H: Array, R: Array, seen: Array) -> Po
     totals = tally(list(seen), list(white * white), [-2.0 * np.log(i) for i in inverse])
     variances = np.array([select(t < 0.5, np.nan, S[i, i]) for i, t in enumerate(seen)])
     return Posterior(mean + K @ nu, joseph(cov, K, H, R), *totals, nu, variances)
+
+
+def _condition_on_one(prior: Gaussian, nu: Array, h: Array, r: Any, seen: Array) -> Posterior:
+    """`condition` for k = 1: kashyap (9), last four lines; arguments as there, of the only row.
+
+    A covariance from which a very sharp plot takes nearly all would be left with the rounding of
+    what was taken, of either sign. So a little less is taken: four roundings are enough.
+    """
+    mean, cov = prior
+    cross = cov @ h
+    s = h @ cross + r
+    s = select(s > 0.0, s, np.nan)  # a covariance that is none must not look like one again
+    inverse = _SHORT / s
+    gain = cross * inverse
+    totals = tally(list(seen), [nu[0] * nu[0] * inverse], [np.log(s)])
+    variances = np.array([select(seen[0] < 0.5, np.nan, s)])
+    left = mirror(cov - np.outer(gain, cross))
+    return Posterior(mean + gain * nu[0], left, *totals, nu, variances)
 
 
 def update_plot(prior: Gaussian, z: Array, components: Sequence[Component]) -> Posterior:

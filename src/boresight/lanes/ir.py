@@ -64,6 +64,35 @@ def _store(w: Writer, argument: str, base: str, element: int, value: str) -> Non
     )
 
 
+def _store_turned(w: Writer, bases: str, element: int, values: list[str]) -> None:
+    """Several numbers of W lanes, turned so that each lane's lie side by side: a store a lane.
+
+    A scatter of every number costs twice as much.
+    """
+    width, kind, some = w.shape.width, w.vector.number, len(values)
+    rows = [*values, *["poison"] * (width - some)]
+    distance = 1
+    while distance < width:
+        for i in (i for i in range(width) if not i & distance):
+            pair = f"{kind} {rows[i]}, {kind} {rows[i + distance]}"
+            low = [p + width - distance if p & distance else p for p in range(width)]
+            high = [p + width if p & distance else p + distance for p in range(width)]
+            rows[i], rows[i + distance] = (_shuffle(w, pair, mask) for mask in (low, high))
+        distance *= 2
+    for lane, row in enumerate(rows):
+        start = w.emit(f"extractelement <{width} x ptr> {bases}, i64 {lane}")
+        place = w.emit(f"getelementptr double, ptr {start}, i64 {element}")
+        part = row
+        if some < width:
+            part = _shuffle(w, f"{kind} {row}, {kind} poison", list(range(some)))
+        w.line(f"  store <{some} x double> {part}, ptr {place}, align 8")
+
+
+def _shuffle(w: Writer, pair: str, mask: list[int]) -> str:
+    places = ", ".join(f"i32 {p}" for p in mask)
+    return w.emit(f"shufflevector {pair}, <{len(mask)} x i32> <{places}>")
+
+
 def _lane_base(w: Writer, argument: str, size: int, steps: str) -> str:
     """Where the data of this chunk's lanes begin in an argument of `size` numbers a step."""
     numbers = w.emit(f"mul i64 {steps}, {size}")
@@ -244,5 +273,12 @@ def _write_outputs(w: Writer, results: list[str], bases: list[str], rate: Rate) 
         if slot.rate != rate:
             continue
         place = _step_base(w, base, slot.leaf.size) if rate == Rate.EACH else base
-        for k, node in enumerate(numbers):
-            _store(w, argument, place, k, w.value(node, w.vector))
+        values = [w.value(node, w.vector) for node in numbers]
+        k, count = 0, len(values)
+        while k < count:  # the largest power of two that is left, but no more than the lanes
+            some = min(w.shape.width, 1 << (count - k).bit_length() - 1) if w.shape.rows else 1
+            if some == 1:
+                _store(w, argument, place, k, values[k])
+            else:
+                _store_turned(w, place, k, values[k : k + some])
+            k += some

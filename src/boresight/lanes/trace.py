@@ -127,8 +127,17 @@ class Graph:
             return None
         if op == "neg" and self.nodes[args[0].index][0] == "neg":
             return Symbol(self, self.nodes[args[0].index][1][0])
+        if op == "exp" and self.nodes[args[0].index][0] == "select":
+            return self._exp_of_select(*self.nodes[args[0].index][1])
         values = [self.values[a.index] for a in args]
         return None if None in values else self._fold(op, values)
+
+    def _exp_of_select(self, condition: int, a: int, b: int) -> "Symbol | None":
+        """Of a number and a constant: the number's own exponential is often there already."""
+        if self.values[a] is None and self.values[b] is None:
+            return None
+        both = [self.apply("exp", Symbol(self, i)) for i in (a, b)]
+        return self.apply("select", Symbol(self, condition), *both)
 
     def _fold(self, op: str, values: list[float | None]) -> "Symbol":
         with np.errstate(all="ignore"):

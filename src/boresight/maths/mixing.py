@@ -20,8 +20,11 @@ def weigh(logs: Sequence[Any]) -> list[Any]:
 
 
 def mix(weights: Sequence[Any], values: Sequence[Any]) -> Any:
-    """Average of the parts' values."""
-    return sum(w * value for w, value in zip(weights, values, strict=True))
+    """Average of the parts' values; one of weight 0 may hold anything, NaN too."""
+    total = 0.0
+    for w, value in zip(weights, values, strict=True):
+        total = select(w > 0.0, total + w * value, total)
+    return total
 
 
 def greatest(logs: Sequence[Any]) -> Any:
@@ -45,13 +48,10 @@ def moments(weights: Sequence[Any], parts: Sequence[Gaussian]) -> Gaussian:
     """Mean and covariance of a mixture: what the parts have, and how far they lie apart.
 
     Args:
-        weights: sum to one; a part with weight 0 may hold anything, NaN too.
+        weights: sum to one; a part with weight 0 has no say.
         parts: means (n,), covs (n, n).
     """
-    used = [select(w > 0.0, 1.0, 0.0) for w in weights]
-    means = [select(u > 0.5, part.mean, 0.0) for u, part in zip(used, parts, strict=True)]
-    covs = [select(u > 0.5, part.cov, 0.0) for u, part in zip(used, parts, strict=True)]
-    mean = mix(weights, means)
-    apart = [each - mean for each in means]
-    spread = [P + np.outer(d, d) for P, d in zip(covs, apart, strict=True)]
+    mean = mix(weights, [part.mean for part in parts])
+    apart = [part.mean - mean for part in parts]
+    spread = [part.cov + np.outer(d, d) for part, d in zip(parts, apart, strict=True)]
     return Gaussian(mean, mirror(mix(weights, spread)))

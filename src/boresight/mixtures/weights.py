@@ -36,9 +36,12 @@ def reweigh(logs: Sequence[Any], likelihoods: Sequence[Any], prune: float) -> li
     raw = [select(usable, new, log) for log, new in zip(logs, both, strict=True)]
     top = greatest(raw)
     level = [log - top for log in raw]
-    total = sum(np.exp(log) for log in level)
-    floor = np.log(prune * total) if prune > 0.0 else 0.5 * GONE
-    return [select((log < floor) & (log < 0.0), GONE, log) for log in level]
+    shares = [np.exp(log) for log in level]
+    floor = prune * sum(shares)
+    gone = [
+        (s < floor) & (log < 0.0) | (log < 0.5 * GONE) for s, log in zip(shares, level, strict=True)
+    ]
+    return [select(g, GONE, log) for g, log in zip(gone, level, strict=True)]
 
 
 def weights_over_time(likelihoods: Array, *, prune: float = 1e-3) -> Array:
