@@ -193,9 +193,10 @@ def _turned(bottom: float, top: float) -> Chart:
         (each for each in (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30) if (top - bottom) / each <= 6), 90
     )
     ticks = np.arange(np.ceil(bottom / step), np.floor(top / step) + 1) * step
+    form = "03.0f" if step >= 1 else "05.1f"
     return {
         "tickvals": floats(ticks),
-        "ticktext": [f"{each % 360:g}" for each in np.round(ticks, 6)],
+        "ticktext": [f"{each % 360:{form}}" for each in np.round(ticks, 6)],
     }
 
 

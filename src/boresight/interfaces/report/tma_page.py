@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from boresight.target_motion.result import TargetMotion, TmaResult
 
 DETAILED = 12  # contacts that are drawn; more, and the page would grow past what a mail carries
-TALL_PX, MIDDLE_PX, WEIGHTS_PX = 760, 560, 300
+TALL_PX, MIDDLE_PX, WEIGHTS_PX, ENTRY_PX = 760, 560, 300, 22
 CONTACTS = (
     "<p>Where the range is not told, bearings alone cannot tell it to anyone: its 90 % region "
     "rests on what was believed before.{rest}</p>"
@@ -103,8 +103,9 @@ def _pair(drawn: Sequence[Panel], captions: Sequence[str], height_px: int) -> st
 
 
 def _cells(view: View, drawn: Sequence[Panel]) -> str:
-    said = tma_cells.caption(view)
-    return "".join(panel(each.name, said, alt=each.alt, height_px=WEIGHTS_PX) for each in drawn)
+    said, entries = tma_cells.caption(view), len(view.motion.cells.range_m)
+    height = max(WEIGHTS_PX, ENTRY_PX * entries)  # the legend is not cut, on paper too
+    return "".join(panel(each.name, said, alt=each.alt, height_px=height) for each in drawn)
 
 
 def _residuals(view: View, drawn: Sequence[Panel]) -> str:
