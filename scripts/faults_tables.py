@@ -43,7 +43,6 @@ FAULTS = (
             "self.position_m, self.velocity_mps, axis=0",
             "self.position_m, -self.velocity_mps, axis=0",
         ),
-        ("np.unwrap(self.angles[name])", "self.angles[name]"),
         ("float(np.median(step)), _GAP_S)", "float(np.median(step)), 100.0 * _GAP_S)"),
         ("_GAP_STEPS, _GAP_S = 5.0, 10.0", "_GAP_STEPS, _GAP_S = 5.0, 0.0"),
         ("& ~logged", "| logged"),

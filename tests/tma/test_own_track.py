@@ -56,11 +56,30 @@ def test_bearings_in_a_gap_are_kept_on_a_straight_leg_only():
     found, remarks = one(heard(), straight, sigma_deg=1)
     assert len(found.time_s) == 101
     assert remarks == ()
+    rough = straight.with_columns(north_m=pl.Series(0.1 * np.sin(2.0 * np.arange(70.0))))
+    assert len(one(heard(), rough, sigma_deg=1)[0].time_s) == 101
     turning = circle(101, 1.0).filter(~pl.col("time_s").is_between(40, 70))
     found, remarks = one(heard(), turning, sigma_deg=1)
     assert not np.any((found.time_s > 39) & (found.time_s < 71))
     assert len(found.time_s) == 101 - 31
     assert said(remarks, "31 bearings", "gaps")
+
+
+def test_a_turn_at_the_end_of_a_gap_makes_it_unsure():
+    """East up to the last fix before 70 s, and North from there."""
+    t = np.arange(0.0, 101.0)
+    course, ahead = np.where(t < 70, 90.0, 0.0), np.maximum(t - 70, 0.0)
+    place = {"north_m": 5 * ahead, "east_m": 5 * np.minimum(t, 70.0)}
+    own = pl.DataFrame({"time_s": t, **place, "course_deg": course, "speed_mps": 5.0})
+    found, _ = one(heard(), own.filter(~pl.col("time_s").is_between(41, 69)), sigma_deg=1)
+    assert len(found.time_s) == 101 - 29
+
+
+def test_a_gap_is_longer_than_ten_seconds():
+    """In a turn of 3 degrees a second 9 s between fixes are bridged, 13 s are not."""
+    for last, count in ((48, 101), (52, 101 - 12)):
+        turning = circle(101, 1.0).filter(~pl.col("time_s").is_between(41, last))
+        assert len(one(heard(), turning, sigma_deg=1)[0].time_s) == count
 
 
 def test_bearings_outside_the_log_are_counted_and_left_out():
@@ -153,3 +172,11 @@ def test_a_towed_array_is_where_the_ship_was():
     steady = np.abs(t - 100) > 2  # where the ship turns on the spot its curve has no speed
     assert np.allclose(found.velocity_mps[first & steady], [0, 5], rtol=0, atol=1e-6)
     assert np.allclose(np.hypot(*found.velocity_mps[steady].T), 5, rtol=0, atol=1e-6)
+
+
+def test_a_towed_array_lies_along_the_path_whatever_the_ship_heads():
+    cones = heard(conical=True)
+    towed, _ = one(cones, ship(heading_deg=80.0), tow_m=200.0, sigma_deg=1)
+    assert np.allclose(np.degrees(towed.axis_rad), 90.0, rtol=0, atol=1e-6)
+    hull, _ = one(cones, ship(heading_deg=80.0), sigma_deg=1)
+    assert np.allclose(np.degrees(hull.axis_rad), 80.0, rtol=0, atol=1e-6)

@@ -10,7 +10,7 @@ from boresight.mixtures.bank import Bank
 from boresight.target_motion.contact import Contact
 from boresight.target_motion.moments import polar_moments
 from boresight.target_motion.quantities import as_polar, describe, history, regions
-from boresight.target_motion.regions import highest_density
+from boresight.target_motion.regions import highest_density, normal_ends
 
 HERE = np.array([300.0, -200.0])
 NAMES = ("range_m", "bearing_deg", "course_deg", "speed_mps")
@@ -194,6 +194,14 @@ def test_a_density_that_rises_in_a_line_is_cut_by_its_square():
         (low,), (high,) = highest_density(grid, 3.0 * grid, [75, 36])
         assert low == pytest.approx([0.5, 1.0], abs=1e-6)
         assert high == pytest.approx([0.8, 1.0], abs=1e-6)
+
+
+def test_ends_of_a_normal_distribution_are_its_quantiles():
+    weights, means, sds = np.array([[1.0], [1.0]]), np.array([[3e3], [-2.0]]), [[100.0], [0.1]]
+    for level, sd in ((50, 0.67449), (90, 1.64485)):
+        low, high = normal_ends(weights, means, np.array(sds), level)
+        assert (means - low[:, None]) / sds == pytest.approx(np.full((2, 1), sd), rel=0.02)
+        assert (high[:, None] - means) / sds == pytest.approx(np.full((2, 1), sd), rel=0.02)
 
 
 def test_a_region_across_north_runs_past_360():

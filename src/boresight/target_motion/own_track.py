@@ -43,7 +43,8 @@ class OwnTrack:
         velocity_mps: (n, 2), as logged; None where the log has none, or one that cannot be.
         site: place of the plane's origin; None where positions were given in metres.
         north_rad: (n,), direction of true North on the plane.
-        angles: `heading` and `axis` (n,), as logged, from the plane's North.
+        angles: `heading` and `axis` (n,), as logged, from the plane's North; without jumps of a
+            turn.
     """
 
     time_s: Array
@@ -86,7 +87,7 @@ class OwnTrack:
 
     def direction(self, name: str, time_s: Array) -> Array:
         """(m,) a logged angle, between its two neighbours."""
-        return np.interp(time_s, self.time_s, np.unwrap(self.angles[name]))
+        return np.interp(time_s, self.time_s, self.angles[name])
 
     def north(self, time_s: Array) -> Array:
         """(m,) direction of true North on the plane where own ship was."""
