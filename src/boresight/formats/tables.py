@@ -147,8 +147,9 @@ def load(path: Path) -> tuple["pl.DataFrame", int]:
             return pl.read_parquet(path), 1
         remarks = 0
         with path.open("rb") as file:
-            while file.readline().startswith(b"#"):
+            while (header := file.readline()).startswith(b"#"):
                 remarks += 1
+        _check_commas(path, header, remarks + 1)
         return pl.read_csv(path, infer_schema=False, comment_prefix="#"), remarks + 2
     except (pl.exceptions.PolarsError, UnicodeDecodeError) as error:
         raise DataError(
@@ -158,12 +159,24 @@ def load(path: Path) -> tuple["pl.DataFrame", int]:
         ) from None
 
 
+def _check_commas(path: Path, header: bytes, line: int) -> None:
+    """Refuse a table whose columns something else parts."""
+    for mark, name in ((b";", "semicolons"), (b"\t", "tabs")):
+        if mark in header and b"," not in header and b"\0" not in header:
+            raise DataError(
+                f"{path}: {name} part its columns",
+                where=f"line {line}",
+                why="a CSV table has commas between columns and points in numbers",
+                next_step="save it with commas, or as Parquet",
+            )
+
+
 def _check_map(path: Path, raw: "pl.DataFrame", wanted: dict[str, str]) -> dict[str, str]:
     for ours, theirs in wanted.items():
         if theirs not in raw.columns:
             raise UsageError(
                 f"{path} has no column {theirs!r} to take {ours} from",
-                why=f"its columns: {', '.join(raw.columns)}",
+                why=f"its columns: {', '.join(each for each in raw.columns if each != 'line')}",
                 next_step="correct the column map",
             )
         if not is_our_name(ours):

@@ -44,8 +44,26 @@ def analyse(
     return Answer(
         content=content(found, outputs),
         screen=lambda width: screens_tma.analysed(found, outputs, width),
-        remarks=[*found.remarks, *found.main.contact.remarks, *found.main.remarks],
+        remarks=[*found.remarks, *remarks_of(found)],
     )
+
+
+def remarks_of(found: "TmaResult") -> list[str]:
+    """What is said of the contacts: of one plainly, of those in full by name, of many of the first.
+
+    The rest is in the report and in the object that --json prints.
+    """
+    if len(found.contacts) == 1:
+        return [*found.main.contact.remarks, *found.main.remarks]
+    is_many = len(found.contacts) > screens_tma.FULL
+    shown = found.contacts[:1] if is_many else found.contacts
+    said = [
+        f"{one.contact.name}: {r}" for one in shown for r in (*one.contact.remarks, *one.remarks)
+    ]
+    others = sum(bool(one.contact.remarks or one.remarks) for one in found.contacts[len(shown) :])
+    if others:
+        said.append(f"There are remarks on {others} more contacts: see the report, or --json.")
+    return said
 
 
 def write(found: "TmaResult", folder: Path, about: Mapping[str, Any], manner: Manner) -> list[str]:

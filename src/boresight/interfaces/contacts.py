@@ -121,6 +121,7 @@ def _some(given: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 def chosen_filter(name: str, **settings: Any) -> "Filter":
     """A filter of the catalogue with the settings that were given; UsageError for one of no use."""
     from boresight import catalogue
+    from boresight.target_motion.analyse import BANKS
 
     chosen = catalogue.lookup(name)
     if not name.startswith("rp-"):
@@ -129,7 +130,8 @@ def chosen_filter(name: str, **settings: Any) -> "Filter":
                 raise UsageError(
                     f"{name} has no setting {key}",
                     why="it is a single filter",
-                    next_step=f"use rp-{name}, or leave it out",
+                    next_step=f"use {f'rp-{name}' if f'rp-{name}' in BANKS else FILTER}, or leave "
+                    "it out",
                 )
         return chosen
     return chosen.with_settings(**(SMOOTH | settings))

@@ -25,7 +25,10 @@ def analysed(found: "TmaResult", outputs: Sequence[str], width: int) -> "list[Re
     """The screen of `boresight tma`."""
     del width
     many = len(found.contacts) > FULL
-    parts = [_overview(found)] if many else [p for each in found.contacts for p in _contact(each)]
+    if many:
+        return [_overview(found), *written(outputs)]
+    first, *others = (_contact(each) for each in found.contacts)
+    parts = [*first, *(part for each in others for part in (text(""), *each))]
     return [*parts, *written(outputs)]
 
 
@@ -48,7 +51,7 @@ def _grid(heading: str, one: "TargetMotion | Side") -> "RenderableType":
     grid = table(heading, "", "estimate", "sd", "50 % region", "90 % region", "99 % region")
     for words, name, unit in ROWS:
         quantity = getattr(one, name)
-        regions = [_region(quantity, level) for level in ("50", "90", "99")]
+        regions = [_region(quantity, level, unit) for level in ("50", "90", "99")]
         grid.add_row(words, *_figures(quantity, unit), *regions)
     for column in grid.columns[3:]:
         column.no_wrap = False  # a region in pieces
@@ -62,13 +65,24 @@ def _figures(quantity: "Quantity", unit: str) -> tuple[str, str]:
     return with_unit(quantity.estimate, digits, unit).lstrip("+"), f"{quantity.sd:,.{digits}f}"
 
 
-def _region(quantity: "Quantity", level: str) -> str:
-    """The intervals of a region: `3,400 to 4,100`, in pieces where it is."""
+def _region(quantity: "Quantity", level: str, unit: str) -> str:
+    """The intervals of a region: `3,400 to 4,100`, in pieces where it is; `350 to 10` over North.
+
+    Pieces that touch in the digits shown are one.
+    """
     pieces = quantity.regions.get(level, ())
     if not pieces:
         return "–"
     digits = decimals(sum(high - low for low, high in pieces) / 8.0)
-    return ", ".join(f"{low:,.{digits}f} to {high:,.{digits}f}" for low, high in pieces)
+    joined = [pieces[0]]
+    for low, high in pieces[1:]:
+        if round(low, digits) <= round(joined[-1][1], digits):
+            joined[-1] = (joined[-1][0], high)
+        else:
+            joined.append((low, high))
+    turn = 360.0 if unit == "°" and joined[-1][1] - joined[0][0] < 360.0 else float("inf")
+    ends = ([f"{round(end, digits) % turn:,.{digits}f}" for end in pair] for pair in joined)
+    return ", ".join(f"{low} to {high}" for low, high in ends)
 
 
 def _known(one: "TargetMotion") -> str:
@@ -140,6 +154,8 @@ def _either(one: "TargetMotion") -> str:
 
 
 def _lasting(seconds: float) -> str:
-    """A duration: `13 min 20 s`."""
+    """A duration: `13 min 20 s`, `24 h 0 min`."""
     minutes, rest = divmod(round(seconds), 60)
+    if minutes >= 120:
+        return f"{minutes // 60} h {minutes % 60} min"
     return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -50,6 +50,7 @@ def angles(
         table = _from_differences(table, remarks, array_spacing_m, sound_speed_mps)
     else:
         table = _from_bearings(table, ship, remarks, declination_deg)
+    _tell_unused(table, remarks, sigma_deg, array_spacing_m, sound_speed_mps)
     given = np.nan if sigma_deg is None else np.radians(_positive("sigma_deg", sigma_deg))
     sigma = pl.col("sigma").fill_nan(None)
     if "sigma_deg" in table.columns:
@@ -132,6 +133,24 @@ def _from_bearings(
         cone=pl.Series(np.where(conical, values, np.nan)),
         sigma=pl.lit(np.nan),
     )
+
+
+def _tell_unused(
+    table: "pl.DataFrame",
+    remarks: list[str],
+    sigma_deg: float | None,
+    spacing_m: float | None,
+    sound_mps: float | None,
+) -> None:
+    """Say what was given in vain."""
+    if sigma_deg is not None and "sigma_deg" in table.columns:
+        told = table["sigma_deg"].is_not_null()
+        if told.all():
+            remarks.append("A standard deviation was given, but every row has its own: not used.")
+    if _has_bearing(table):
+        for name, value in (("array's spacing", spacing_m), ("speed of sound", sound_mps)):
+            if value is not None:
+                remarks.append(f"The {name} was given, but there are bearings: not used.")
 
 
 def _magnetic(table: "pl.DataFrame", name: str) -> Array:
