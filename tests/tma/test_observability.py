@@ -199,6 +199,15 @@ def test_at_best_is_of_targets_on_the_bearings_whatever_the_bank_believes():
     assert 0.2 < answer.at_best_percent < 0.6  # the truth's is 0.53
 
 
+def test_at_best_is_the_bank_s_where_no_straight_track_is_on_the_bearings():
+    contact, speed = contact_of(OWN), paper.TARGET * paper.heading(paper.COURSE)[::-1]
+    contact.bearing_rad[:] += 20.0 * paper.SIGMA * np.sin(np.arange(801.0))
+    truth = np.hstack([TARGET[-1], speed])
+    answer = observe(contact, believing([truth], [1.0]), position_sd_m=1e-3)
+    percent = 100.0 * answer.range_sd_m / np.hypot(*(TARGET[-1] - OWN[-1]))
+    assert answer.at_best_percent == pytest.approx(percent, rel=1e-3)
+
+
 def test_at_best_follows_a_cone_from_one_side_of_the_axis_to_the_other():
     contact, speed = contact_of(OWN, cone=True), paper.TARGET * paper.heading(paper.COURSE)[::-1]
     truth = np.hstack([TARGET[-1], speed])

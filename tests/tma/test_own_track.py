@@ -90,6 +90,7 @@ def test_bearings_outside_the_log_are_counted_and_left_out():
 
 APART = {
     "a time zone": (7200.0, "-7200 s (2 h"),
+    "half an hour beside a zone": (19800.0, "-19800 s (5.5 h"),
     "midnight": (-86400.0, "+86400 s (another day)"),
     "an epoch": (1.5e9 - 1.5e9 % 86400, "another epoch"),
     "one from zero": (4000.0, "both begin together"),
@@ -151,6 +152,9 @@ def test_the_plane_holds_places_and_true_bearings_fifty_kilometres_out():
     leans = np.degrees(50_000 / 6.39e6) * np.tan(np.radians(60))  # to the West, where the pole is
     assert np.degrees(found.bearing_rad[-1]) - 30.0 == pytest.approx(-leans, abs=0.01)
     assert said(remarks, "Meridians converge", "0.7")
+    relative = pl.DataFrame({"time_s": t, "bearing_relative_deg": bearing - 90.0})
+    again, _ = one(relative, own.with_columns(heading_deg=pl.lit(90.0)), sigma_deg=1)
+    assert np.allclose(again.bearing_rad, found.bearing_rad, rtol=0, atol=1e-12)
 
 
 # a towed array
@@ -180,3 +184,17 @@ def test_a_towed_array_lies_along_the_path_whatever_the_ship_heads():
     assert np.allclose(np.degrees(towed.axis_rad), 90.0, rtol=0, atol=1e-6)
     hull, _ = one(cones, ship(heading_deg=80.0), sigma_deg=1)
     assert np.allclose(np.degrees(hull.axis_rad), 80.0, rtol=0, atol=1e-6)
+
+
+def test_a_heading_that_is_missing_for_long_is_told():
+    def said(holes):
+        time_s = np.arange(100.0)
+        rows = {"time_s": time_s, "north_m": 3.0 * time_s, "east_m": 0.0 * time_s}
+        heading = [None if low <= t < high else 0.0 for t in time_s for low, high in [holes]]
+        remarks = []
+        own_track(pl.DataFrame(rows | {"heading_deg": heading}), 0.0, remarks)
+        return " ".join(remarks)
+
+    assert "heading is missing for up to 41 s" in said((30, 70))
+    assert "heading is missing for up to 40 s" in said((60, 100))
+    assert "missing" not in said((30, 33))
