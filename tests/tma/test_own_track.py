@@ -12,6 +12,7 @@ from pyproj import Geod
 from boresight.errors import DataError
 from boresight.maths.frames import enu_from_geodetic
 from boresight.target_motion.contacts import contacts
+from boresight.target_motion.own_track import own_track
 
 EARTH = Geod(ellps="WGS84")
 
@@ -187,7 +188,7 @@ def test_a_towed_array_lies_along_the_path_whatever_the_ship_heads():
 
 
 def test_a_heading_that_is_missing_for_long_is_told():
-    def said(holes):
+    def told(holes):
         time_s = np.arange(100.0)
         rows = {"time_s": time_s, "north_m": 3.0 * time_s, "east_m": 0.0 * time_s}
         heading = [None if low <= t < high else 0.0 for t in time_s for low, high in [holes]]
@@ -195,6 +196,6 @@ def test_a_heading_that_is_missing_for_long_is_told():
         own_track(pl.DataFrame(rows | {"heading_deg": heading}), 0.0, remarks)
         return " ".join(remarks)
 
-    assert "heading is missing for up to 41 s" in said((30, 70))
-    assert "heading is missing for up to 40 s" in said((60, 100))
-    assert "missing" not in said((30, 33))
+    assert "heading is missing for up to 41 s" in told((30, 70))
+    assert "heading is missing for up to 40 s" in told((60, 100))
+    assert "missing" not in told((30, 33))

@@ -181,6 +181,7 @@ def own_track(table: "pl.DataFrame", clock_s: float, remarks: list[str]) -> OwnT
         if f"{name}_deg" in table.columns and table[f"{name}_deg"].count()
     }
     velocity = _velocity(table, time_s, position, north, remarks)
+    _tell_holes(table, time_s, remarks)
     return OwnTrack(
         time_s=time_s,
         position_m=position,
@@ -195,6 +196,22 @@ def _between(time_s: Array, angle: Array) -> Array:
     """Angles (n,) without a turn between neighbours, holes (NaN) filled from both sides."""
     known = np.isfinite(angle)
     return np.interp(time_s, time_s[known], np.unwrap(angle[known]))
+
+
+def _tell_holes(table: "pl.DataFrame", time_s: Array, remarks: list[str]) -> None:
+    """Say where an angle of own ship's is missing for long: it is taken from its neighbours."""
+    for name in ("heading", "axis"):
+        if f"{name}_deg" not in table.columns:
+            continue
+        known = np.isfinite(table[f"{name}_deg"].cast(float).fill_null(np.nan).to_numpy())
+        if not known.any():
+            continue
+        away = np.diff(np.concatenate([time_s[:1], time_s[known], time_s[-1:]])).max()
+        if away > max(_GAP_STEPS * float(np.median(np.diff(time_s))), _GAP_S):
+            remarks.append(
+                f"Own ship's {name} is missing for up to {away:.0f} s: there it is taken from the "
+                "rows before and after, which is wrong if own ship turned."
+            )
 
 
 def _plane(table: "pl.DataFrame") -> tuple[Array, Array, Site | None]:
