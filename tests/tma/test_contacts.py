@@ -66,6 +66,17 @@ def test_sigma_is_else_the_scatter_and_said():
     assert said(remarks, "scatter", f"{np.degrees(found.sigma_rad[0]):.3g} degrees")
 
 
+def test_bearings_without_scatter_are_not_taken_as_perfect():
+    smooth = heard().with_columns(bearing_deg=60 + 0.2 * pl.col("time_s"))
+    assert np.degrees(one(smooth, ship())[0].sigma_rad) == pytest.approx(np.full(101, 0.01))
+
+
+def test_a_cone_is_never_magnetic():
+    cones = heard(conical=True)
+    found, _ = one(cones.with_columns(magnetic=pl.lit(value=True)), ship(), sigma_deg=1)
+    assert np.allclose(np.degrees(found.cone_rad), cones["bearing_deg"], rtol=0, atol=1e-12)
+
+
 def test_too_few_bearings_do_not_tell_their_scatter():
     with pytest.raises(DataError, match="how good") as caught:
         contacts(heard(8), ship())
