@@ -229,3 +229,11 @@ def _plane(own):
     return north, np.radians(longitude - longitude[0]) * 6_367_000.0 * np.cos(
         np.radians(latitude[0])
     )
+
+
+def test_an_answer_that_contradicts_itself_has_not_converged():
+    """Ranges that cannot be: the bank comes out far from where it was told to look."""
+    wrong = bs.tma(BEARINGS, OWN_SHIP, nearest_m=100.0, farthest_m=200.0).main
+    assert wrong.converged_s is None
+    assert any("believed possible" in each for each in wrong.remarks)
+    assert bs.tma(BEARINGS, OWN_SHIP).main.converged_s is not None

@@ -4,8 +4,13 @@ import pytest
 
 from boresight.maths.digits import rounded
 from boresight.mixtures.range_parameterised import RangeParameterised
-from boresight.target_motion.doubts import of_limits, of_residuals, of_spread
-from boresight.target_motion.result import Quantity, Residuals
+from boresight.target_motion.doubts import (
+    of_difference,
+    of_limits,
+    of_residuals,
+    of_spread,
+)
+from boresight.target_motion.result import Batch, Quantity, Residuals
 from boresight.target_motion.result import Test as Question
 
 
@@ -16,7 +21,7 @@ def failed(name, follows=None):
 
 
 def doubts(*tests):
-    return of_residuals(Residuals(deg=None, tests=tests, false_alarm=0.01))
+    return of_residuals(Residuals(deg=None, tests=tests, false_alarm=0.01), 100)
 
 
 def test_what_follows_is_named_behind_what_explains_it():
@@ -32,7 +37,8 @@ def test_what_follows_is_named_behind_what_explains_it():
     )
     assert doubts(failed("outliers"), failed("clock")) == ("outliers!", "clock!")
     assert doubts() == ()
-    assert "batch estimate" in of_residuals(None)[0]
+    assert "No steady track" in of_residuals(None, 5)[0]
+    assert "nothing is left to test" in of_residuals(None, 4)[0]
 
 
 def test_an_sd_below_half_of_the_bound_is_a_fault():
@@ -60,3 +66,19 @@ def test_sizes_have_two_digits():
         "0",
         "10.0",
     ]
+
+
+def batch_at(range_m, sd_m):
+    there = Quantity(estimate=range_m, sd=sd_m)
+    return Batch(
+        mean=None, cov=None, cost=0.0, converged=True,
+        range_m=there, bearing_deg=there, course_deg=there, speed_mps=there,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("range_m", "count"), [(1290.0, 0), (1310.0, 1), (690.0, 1)])
+def test_a_range_that_all_bearings_at_once_deny_is_doubted(range_m, count):
+    answer = Quantity(estimate=range_m, sd=50.0)
+    assert len(of_difference(answer, batch_at(1000.0, 100.0))) == count
+    assert of_difference(Quantity(estimate=None, sd=None), batch_at(1000.0, 100.0)) == ()
+    assert of_difference(answer, None) == ()

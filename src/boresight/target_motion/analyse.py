@@ -3,7 +3,7 @@
 [pradeep], as corrected by errata P1 to P10; [nardone1984] for what bearings alone can tell.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,12 @@ from boresight.models.checks import not_negative, positive
 from boresight.models.motion import ConstantVelocity
 from boresight.target_motion.contact import Contact
 from boresight.target_motion.convergence import check_criteria, converge
-from boresight.target_motion.doubts import of_limits, of_residuals, of_spread
+from boresight.target_motion.doubts import (
+    of_difference,
+    of_limits,
+    of_residuals,
+    of_spread,
+)
 from boresight.target_motion.observability import observe
 from boresight.target_motion.quantities import QUANTITIES, as_polar, describe, history
 from boresight.target_motion.residuals import judge
@@ -96,12 +101,7 @@ def analyse(
     belief, criteria = belief or Belief(), criteria or Criteria()
     check_criteria(criteria)
     method = chosen.method
-    if contact.is_conical and not isinstance(method, RangeParameterised):
-        raise UsageError(
-            f"{chosen.name} follows one side of the array's axis",
-            why=f"the bearings of {contact.name} are cones, which have two",
-            next_step=f"use rp-{chosen.name}" if f"rp-{chosen.name}" in BANKS else "use rp-ekf",
-        )
+    _check_sides(contact, chosen)
     spread = method if isinstance(method, RangeParameterised) else belief.spread
     bank = _filtered(contact, method, spread, belief)
     seen = observe(contact, bank, position_sd_m=belief.position_sd_m)
@@ -112,13 +112,22 @@ def analyse(
     past, residuals = history(bank, contact), _judged(contact, fit)
     is_known = _known(contact, seen)
     estimate, sd = (np.stack([past[n] for n in names], axis=-1) for names in (QUANTITIES, _SDS))
+    met = converge(estimate, sd, is_known, bound, criteria, contact.time_s)
+    batch = _batch(contact, fit) if fit.converged[0] and seen.observable else None
+    against = (
+        *of_spread(past["range_sd_m"][-1], bound[-1, 0]),
+        *of_limits(answer.range_m, spread),
+        *(() if belief.accel_mps2 else of_difference(answer.range_m, batch)),
+    )
+    heard = int(np.isfinite(contact.plots).any(-1).sum())
     return TargetMotion(
         contact=contact,
         filter=chosen.name,
-        bearings=int(np.isfinite(contact.plots).any(-1).sum()),
+        bearings=heard,
         criteria=criteria,
         observability=seen,
-        convergence=converge(estimate, sd, is_known, bound, criteria, contact.time_s),
+        # What contradicts itself has not converged, however small it says its errors are.
+        convergence=replace(met, sustained_s=None) if against else met,
         **{name: getattr(answer, name) for name in QUANTITIES},
         mean=answer.mean,
         cov=answer.cov,
@@ -126,15 +135,21 @@ def analyse(
         decided=answer.decided,
         history=_table(contact, past, bound, is_known),
         cells=_cells(bank, spread if isinstance(method, RangeParameterised) else None),
-        batch=_batch(contact, fit) if fit.converged[0] and seen.observable else None,
+        batch=batch,
         residuals=residuals,
         settings=_settings(chosen, spread, belief),
-        remarks=(
-            *of_spread(past["range_sd_m"][-1], bound[-1, 0]),
-            *of_limits(answer.range_m, spread),
-            *of_residuals(residuals),
-        ),
+        remarks=(*against, *of_residuals(residuals, heard)),
     )
+
+
+def _check_sides(contact: Contact, chosen: Filter) -> None:
+    """Refuse a filter that follows one side of an array, where it hears two."""
+    if contact.is_conical and not isinstance(chosen.method, RangeParameterised):
+        raise UsageError(
+            f"{chosen.name} follows one side of the array's axis",
+            why=f"the bearings of {contact.name} are cones, which have two",
+            next_step=f"use rp-{chosen.name}" if f"rp-{chosen.name}" in BANKS else "use rp-ekf",
+        )
 
 
 def _filtered(contact: Contact, method: Any, spread: RangeParameterised, belief: Belief) -> Bank:

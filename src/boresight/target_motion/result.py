@@ -93,7 +93,8 @@ class Convergence:
 
     Attributes:
         first_s: for the first time.
-        sustained_s: for good, up to the last bearing.
+        sustained_s: for good, up to the last bearing; None too for an answer that contradicts
+            itself, however sure it is.
         permitted_s: the earliest time at which the Cramér-Rao bound permits them for good.
     """
 

@@ -93,7 +93,7 @@ def _why(motion: "TargetMotion") -> str:
 
 def _doubts(motion: "TargetMotion") -> Iterator[Sentence]:
     """Say what speaks against the answer."""
-    of_bearings = of_residuals(motion.residuals)
+    of_bearings = of_residuals(motion.residuals, motion.bearings)
     for words in motion.remarks:
         link = "residuals" if words in of_bearings else "history"
         yield Sentence("attention", escape(words), link)
