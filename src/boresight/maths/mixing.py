@@ -23,7 +23,7 @@ def mix(weights: Sequence[Any], values: Sequence[Any]) -> Any:
     """Average of the parts' values; one of weight 0 may hold anything, NaN too."""
     total = 0.0
     for w, value in zip(weights, values, strict=True):
-        total = select(w > 0.0, total + w * value, total)
+        total = select(w <= 0.0, total, total + w * value)  # a weight that is NaN must show
     return total
 
 
