@@ -37,6 +37,7 @@ SOUP = "stonesoup ekf, one run"
 # Of the largest coordinate; Stone Soup takes numeric Jacobians.
 TOLERANCE = {ONE: 1e-9, ALL: 1e-9, HAND: 1e-9, SOUP: 1e-5}
 LIMIT_S, TIMES = 0.15, 50.0
+REPEATS = 40  # of ours, so that its timed run is as long as NumPy's, on caches as warm
 
 
 def cells() -> tuple[Array, Array]:
@@ -214,9 +215,16 @@ def main() -> None:
     def ekf() -> Any:
         return bs.run("ekf", *models, plots, start=single, outputs=("mean", "cov"))
 
+    def repeated(task: Callable[[], Any]) -> Callable[[], None]:
+        def several() -> None:
+            for _ in range(REPEATS):
+                task()
+
+        return several
+
     tasks: dict[str, Callable[[], Any]] = {
-        "boresight.run rp-ekf": bank,
-        "boresight.run ekf": ekf,
+        "boresight.run rp-ekf": repeated(bank),
+        "boresight.run ekf": repeated(ekf),
         "particle_filter": lambda: bs.particle_filter(
             plots.z[:PARTICLE_RUNS], *models, plots.dt, cloud, seed=SEED
         ),
@@ -232,6 +240,8 @@ def main() -> None:
         differences[SOUP] = apart(SOUP, peer(z[0, heard]), ekf().mean[0, heard])
         tasks[SOUP] = lambda: peer(z[0, heard])
     units = dict.fromkeys(tasks, RUNS * STEPS) | {
+        "boresight.run rp-ekf": REPEATS * RUNS * STEPS,
+        "boresight.run ekf": REPEATS * RUNS * STEPS,
         "particle_filter": PARTICLE_RUNS * PARTICLES * STEPS,
         ONE: STEPS,
         SOUP: SHORT,
@@ -246,7 +256,7 @@ def report(times: dict[str, Any], median: dict[str, float], differences: dict[st
     bank = median["boresight.run rp-ekf"]
     targets = {
         "CPU s of 200 runs, 801 bearings, six cells": at_most(
-            times["boresight.run rp-ekf"]["median"], LIMIT_S
+            times["boresight.run rp-ekf"]["median"] / REPEATS, LIMIT_S
         )
     }
     for name in (ONE, ALL):
@@ -263,6 +273,7 @@ def report(times: dict[str, Any], median: dict[str, float], differences: dict[st
             "runs": RUNS,
             "steps": STEPS,
             "cpu_s": times,
+            "repeats_of_ours_in_cpu_s": REPEATS,
             "ns_a_run_and_step": {name: 1e9 * value for name, value in median.items()},
             "particles": PARTICLES,
             "relative_difference_from_ours": {"is": differences, "at_most": TOLERANCE},
