@@ -34,7 +34,7 @@ Array = Any
 Predicted = Literal["points", "first order"]
 _ANYWHERE = 1_000.0  # m: angles look alike from every range
 _NEAR = 1e-12  # least square of what a step leaves of a range
-_NARROWEST, _WIDEST = 1e-6, 0.95  # of half a uniform range's width over its middle
+_NARROW, _WIDEST = 1e-3, 0.95  # of half a uniform range's width over its middle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,10 +244,13 @@ def _over(state: Gaussian) -> Gaussian:
     be: weights 1/x then shift their means by minus their covariance with it.
     """
     x, t = state.mean[3], np.sqrt(3.0 * state.cov[3, 3]) / state.mean[3]
-    t = select(t > _NARROWEST, select(t < _WIDEST, t, _WIDEST), _NARROWEST)
-    mid = np.log((1.0 + t) / (1.0 - t)) / (2.0 * t)
+    t = select(t < _WIDEST, t, _WIDEST)
+    wide = select(t > _NARROW, t, _NARROW)
+    mid = np.log((1.0 + wide) / (1.0 - wide)) / (2.0 * wide)
     q = 1.0 / ((1.0 - t * t) * mid * mid) - 1.0  # squared relative spread of 1/x
-    q = select(q > t * t / 3.0, q, t * t / 3.0)
+    # Below, the difference from 1 has few digits left: both are taken to the second order.
+    mid = select(t > _NARROW, mid, 1.0 + t * t / 3.0)
+    q = select(t > _NARROW, q, t * t / 3.0)
     y = mid / x
     sd = np.sqrt(select(state.cov[3, 3] > 0.0, state.cov[3, 3], 1.0))
     k = state.cov[3] * (np.sqrt(q / (1.0 + 0.5 * q)) / sd)
