@@ -143,6 +143,8 @@ def test_settings_are_what_was_asked_for(written):
         (("--speed", 0), "speed_mps"),
         (("--prune", 1.5), "prune"),
         (("--cells", 0), "cells"),
+        (("--cells", 10_000), "from 1 to 200"),
+        (("--speed", 1e9), "speed_mps"),
         (("--track", "nobody"), "nobody"),
     ],
 )

@@ -30,6 +30,7 @@ from boresight.models.sensors import Radar, Sensor
 Array = Any
 Told = Literal["moments", "best cell"]
 SPEED_MPS = CONTACT_MPS
+MOST_CELLS = 200
 FUSED_ON_CONES = 3  # modified polar cells a side: more are more operations than a program has
 
 _MEMBERS: Mapping[str, Any] = {
@@ -76,8 +77,11 @@ class RangeParameterised:
             raise unknown("member", self.member, _MEMBERS)
         if self.told not in get_args(Told):
             raise UsageError(f"told={self.told!r} is unknown", next_step=f"use {get_args(Told)}")
-        if not (isinstance(self.cells, int) and self.cells >= 1):
-            raise UsageError(f"cells={self.cells!r} is not a whole number of at least one")
+        if not (isinstance(self.cells, int) and 1 <= self.cells <= MOST_CELLS):
+            raise UsageError(
+                f"cells={self.cells!r} is not a whole number from 1 to {MOST_CELLS}",
+                next_step="a dozen with overlap=1.5 leave no gaps",
+            )
         if not 0.0 < self.nearest_m < self.farthest_m < np.inf:
             raise UsageError(
                 f"range cells from {self.nearest_m:g} to {self.farthest_m:g} m",

@@ -45,6 +45,7 @@ Array = Any
 BANKS = ("rp-ekf", "rp-mgekf", "rp-ukf", "rp-ckf", "rp-modified-polar")
 _SDS = ("range_sd_m", "bearing_sd_deg", "course_sd_deg", "speed_sd_mps")
 _BOUNDS = ("range_bound_m", "bearing_bound_deg", "course_bound_deg", "speed_bound_mps")
+FASTEST_MPS = 10_000.0  # of what may be believed: no contact is faster
 MOTION = ConstantVelocity(accel_mps2=0.0, dims=2)
 _DEGREES = np.array([1.0, 180.0 / np.pi, 180.0 / np.pi, 1.0])  # of polar columns in radians
 
@@ -69,7 +70,8 @@ class Belief:
 
     def __post_init__(self) -> None:
         """Numbers are checked."""
-        positive("speed_mps", self.speed_mps)
+        if positive("speed_mps", self.speed_mps) > FASTEST_MPS:
+            raise UsageError(f"speed_mps={self.speed_mps:g} is above {FASTEST_MPS:,.0f} m/s")
         not_negative("accel_mps2", self.accel_mps2)
         positive("position_sd_m", self.position_sd_m)
         RangeParameterised(nearest_m=self.nearest_m, farthest_m=self.farthest_m)
