@@ -161,7 +161,7 @@ def tma(
     spacing: options.Spacing = None,
     sound_speed: options.SoundSpeed = None,
     limits: options.Limits = None,
-    columns: options.Columns = None,
+    columns: options.BearingColumns = None,
     own_ship_columns: options.OwnShipColumns = None,
     output: options.Output | None = None,
 ) -> Job:

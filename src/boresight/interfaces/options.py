@@ -142,6 +142,10 @@ Limits = Annotated[
         "sure one must be.",
     ),
 ]
+BearingColumns = Annotated[
+    str | None,
+    Parameter(help="The bearings' columns as OURS=THEIRS,... (time_s=t,bearing_deg=brg,...)."),
+]
 OwnShipColumns = Annotated[
     str | None, Parameter(help="The same for own ship's table (latitude_deg=lat,...).")
 ]
