@@ -158,6 +158,9 @@ def _figures(value: float, sd: float) -> str:
     return f"{value:z.{digits}f} ± {sd:.{digits}f}"
 
 
+_ABSURD = 10.0  # times what would be worst: a figure that says nothing
+
+
 def _told(
     fit: Fit, name: str, found: _Found, false_alarm: float, *, unit: str, wrong: str, well: str,
     mute: str, worst: float = np.inf,
@@ -169,7 +172,7 @@ def _told(
         return unjudged(name)
     estimate, sd = float(found.estimate[0]), float(found.sd[0])
     seen = float(norm.isf(false_alarm / 2.0) + norm.ppf(0.9)) * sd
-    if np.isinf(sd):
+    if seen > _ABSURD * worst or np.isinf(sd):
         return not_asked(name, mute)
     if seen > worst:
         return not_asked(name, f"on this course less than {seen:.0f}{unit} could not be seen")
