@@ -1,7 +1,6 @@
 """`reproduce bordonaro`: a verdict for every row, from numbers that were computed now."""
 
 import ast
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from boresight.experiments.simulate import simulate
 from boresight.experiments.verdicts import of_differences, of_points, together
 from boresight.interfaces.door import assumptions
 from oracles import printed_conversions
+from reproduced import KEYS, VERDICTS, numbers, parts
 
 ROWS = [
     *(f"BO-S0{i}" for i in range(1, 9)),
@@ -32,8 +32,6 @@ ROWS = [
     "BO-W1",
     "BO-W2",
 ]
-KEYS = {"id", "where", "published", "ours", "band", "verdict", "assumption"}
-VERDICTS = {"reproduces", "in band", "does not reproduce", "cannot be checked"}
 FEW = 200
 TABLE = paper("bordonaro")
 
@@ -56,16 +54,6 @@ def claims(result):
 @pytest.fixture(scope="module")
 def study():
     return Study(TABLE, FEW, 1)
-
-
-def parts(claim):
-    return {part["id"].removeprefix(f"{claim['id']} "): part for part in claim["parts"]}
-
-
-def numbers(folder, name):
-    with (folder / f"{name}.csv").open(encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
 
 
 def test_every_row_has_one_verdict(result, claims):

@@ -1,7 +1,6 @@
 """`reproduce kashyap`: a verdict for every row, from numbers that were computed now."""
 
 import ast
-import csv
 import json
 import re
 from dataclasses import replace
@@ -24,6 +23,7 @@ from boresight.experiments.scenario import lookup, paper
 from boresight.experiments.simulate import simulate
 from boresight.experiments.verdicts import of_table
 from oracles import kashyap as oracle
+from reproduced import KEYS, VERDICTS, numbers, parts
 
 ROWS = [
     *(f"KA-S0{i}" for i in range(1, 7)),
@@ -36,8 +36,6 @@ ROWS = [
     *(f"KA-C{i}" for i in range(1, 7)),
     "KA-E1",
 ]
-KEYS = {"id", "where", "published", "ours", "band", "verdict", "assumption"}
-VERDICTS = {"reproduces", "in band", "does not reproduce", "cannot be checked"}
 FEW = 60
 TABLE = paper("kashyap")
 SHARED = Path(__file__).parents[1] / ".." / "shared"
@@ -69,16 +67,6 @@ def result(folder):
 @pytest.fixture(scope="module")
 def claims(result):
     return {claim["id"]: claim for claim in result["claims"]}
-
-
-def parts(claim):
-    return {part["id"].removeprefix(f"{claim['id']} "): part for part in claim["parts"]}
-
-
-def numbers(folder, name):
-    with (folder / f"{name}.csv").open(encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
 
 
 def ratios_inside(claims):

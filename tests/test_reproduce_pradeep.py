@@ -1,7 +1,6 @@
 """`reproduce pradeep`: a verdict for every row, from numbers that were computed now."""
 
 import ast
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from boresight.experiments.simulate import simulate
 from boresight.maths import Gaussian
 from boresight.mixtures.bank import run_bank
 from boresight.mixtures.range_parameterised import RangeParameterised
+from reproduced import KEYS, VERDICTS, numbers, parts
 
 ROWS = [
     *(f"PR-S0{i}" for i in range(1, 4)),
@@ -28,8 +28,6 @@ ROWS = [
     "PR-X1",
     *(f"PR-C{i}" for i in range(1, 7)),
 ]
-KEYS = {"id", "where", "published", "ours", "band", "verdict", "assumption"}
-VERDICTS = {"reproduces", "in band", "does not reproduce", "cannot be checked"}
 FEW = 30
 TABLE = paper("pradeep")
 
@@ -56,16 +54,6 @@ def study():
 
 def assuming(**changed):
     return TABLE | {"assumed": TABLE["assumed"] | changed}
-
-
-def parts(claim):
-    return {part["id"].removeprefix(f"{claim['id']} "): part for part in claim["parts"]}
-
-
-def numbers(folder, name):
-    with (folder / f"{name}.csv").open(encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
 
 
 def test_every_row_has_one_verdict(result, claims):

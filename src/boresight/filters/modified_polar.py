@@ -120,6 +120,7 @@ class ModifiedPolar:
         swerve = before + state["velocity"] * dt - now, state["velocity"] - velocity
 
         def moved(kept: Array) -> Array:
+            """The kept state dt later, seen from where own ship then is."""
             turn, rate, bearing, inverse = kept
             p, v = (inverse * each for each in _ahead(swerve, bearing))
             q = np.array([1.0 + rate * dt, turn * dt]) + p
