@@ -28,6 +28,7 @@ def one_clock(
     remarks.append(f"Times are seconds since midnight UTC of {day}.")
 
     def moved(table: "pl.DataFrame") -> "pl.DataFrame":
+        """The table with seconds since that midnight."""
         time = pl.col("time_s")
         return table.with_columns(
             pl.when(time > _UNIX_S).then((time - midnight).round(6)).otherwise(time)
