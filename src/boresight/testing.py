@@ -1,0 +1,1 @@
+"""Laws that every filter keeps, to hold your own filter to."""
