@@ -50,3 +50,20 @@ class Scores:
     runs: Mapping[str, Array]
     nodes: tuple[Node, ...]
     seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """All runs of one cell: what its summary is made from.
+
+    Attributes:
+        count: number of runs, from run 0.
+        runs: numbers of each run in their order, (count,) by name.
+        sums: sums over all runs, the tree's total: (scans,) or (scans, k) by name.
+        seconds: processor time of all chunks together, s.
+    """
+
+    count: int
+    runs: Mapping[str, Array]
+    sums: Mapping[str, Array]
+    seconds: float
