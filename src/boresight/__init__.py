@@ -40,6 +40,7 @@ _WHERE = {
     "experiments.scenario": ["Scenario"],
     "experiments.simulate": ["simulate"],
     "experiments.metrics": ["anees", "rmse"],
+    "experiments.sets": ["gospa", "ospa"],
     "experiments.reproduce": ["reproduce"],
     "interfaces.converting": ["convert"],
     "interfaces.error_models": ["error_model"],

@@ -9,6 +9,8 @@ from boresight.experiments.metrics import anees as anees
 from boresight.experiments.metrics import rmse as rmse
 from boresight.experiments.reproduce import reproduce as reproduce
 from boresight.experiments.scenario import Scenario as Scenario
+from boresight.experiments.sets import gospa as gospa
+from boresight.experiments.sets import ospa as ospa
 from boresight.experiments.simulate import simulate as simulate
 from boresight.filters.own_doppler import track_range_rate as track_range_rate
 from boresight.filters.particle import bearing_particles as bearing_particles
