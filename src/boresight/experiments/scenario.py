@@ -6,15 +6,16 @@ else. All are in SI units (`bordonaro`'s feet become metres) but for `aditya`, w
 """
 
 import tomllib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib import resources
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from boresight.errors import UsageError, unknown
+from boresight.experiments.scenario_checks import check_begin, check_shape, check_sight
 from boresight.filters.start import SPEED_MPS
 from boresight.maths import Gaussian
 from boresight.models.motion import ConstantVelocity, Motion, SphericalUnitRate, Static
@@ -22,7 +23,15 @@ from boresight.models.sensors import Bearings, Pose, Radar, Sensor
 
 Array = Any
 Begin = Literal["random draw", "given", "one plot", "two plots", "on bearing"]
+SPENT: dict[Begin, int] = {
+    "random draw": 0,
+    "given": 0,
+    "one plot": 1,
+    "two plots": 2,
+    "on bearing": 1,
+}
 FOOT_M = 0.3048
+CEILING_M = 15_000.0  # nothing is reported higher
 SPEEDS_MPS = {"m/s": 1.0, "knots": 1852.0 / 3600.0}
 
 
@@ -47,6 +56,15 @@ class Scenario:
         dt_s: s between scans.
         scans: number of scans.
         first_at_start: whether the first scan is at time 0, or one step later.
+        path: (scans, n) where the target is at each scan, given and not drawn: no noise moves it.
+        detection: probability that a scan sees the target; else its whole plot is missing. The
+            scans that make a start always see it.
+        bias: added to what the sensor measures, by component (m, rad, m/s), unknown to filters.
+        false_plots: expected number of false plots of a scan, Poisson.
+        coverage_m: false plots are uniform in range up to this, in azimuth over the circle, in
+            coordinates between minus and plus this, in heights up to `CEILING_M`.
+        coverage_elevation_deg: lowest and highest elevation of false plots.
+        coverage_mps: largest range rate of false plots, either way.
         length_unit: unit of positions and ranges.
         source: paper and section.
     """
@@ -64,30 +82,32 @@ class Scenario:
     dt_s: float = 1.0
     scans: int
     first_at_start: bool = True
+    path: Array | None = None
+    detection: float = 1.0
+    bias: Mapping[str, float] = field(default_factory=dict)
+    false_plots: float = 0.0
+    coverage_m: float = np.nan
+    coverage_elevation_deg: tuple[float, float] = (0.0, 90.0)
+    coverage_mps: float = SPEED_MPS
     length_unit: str = "m"
     source: str = ""
 
     def __post_init__(self) -> None:
         """Lists become arrays, and what cannot be simulated is refused."""
         n = len(self.motion.names)
-        for name, shape in (("initial", (n,)), ("prior_cov", (n, n))):
-            array = np.asarray(getattr(self, name), dtype=float)
-            object.__setattr__(self, name, array)
-            if array.shape != shape:
-                raise UsageError(
-                    f"{name} of scenario {self.name!r} has shape {array.shape}",
-                    why=f"the motion's state is {', '.join(self.motion.names)}",
-                )
-        if self.begin not in get_args(Begin):
-            raise UsageError(
-                f"begin={self.begin!r} of scenario {self.name!r} is not a way to begin",
-                next_step=f"use {', '.join(get_args(Begin))}",
-            )
-        if self.scans < 1 or not self.dt_s > 0:
-            raise UsageError(
-                f"scenario {self.name!r} has scans={self.scans}, dt_s={self.dt_s}",
-                why="there must be at least one scan, and time between scans",
-            )
+        shapes = {"initial": (n,), "prior_cov": (n, n), "path": (self.scans, n)}
+        for name, shape in shapes.items():
+            if getattr(self, name) is not None:
+                array = np.asarray(getattr(self, name), dtype=float)
+                object.__setattr__(self, name, array)
+                check_shape(self, name, shape)
+        check_begin(self, SPENT)
+        check_sight(self)
+
+    @property
+    def spent(self) -> int:
+        """How many scans make the start; their plots are not used again."""
+        return SPENT[self.begin]
 
     @property
     def prior(self) -> Gaussian:
