@@ -35,6 +35,8 @@ _WHERE = {
     "models.atmosphere": ["EffectiveEarth", "ExponentialAtmosphere", "NoAtmosphere"],
     "catalogue": ["cite"],
     "target_motion.result": ["Criteria"],
+    "filters.method": ["Filter", "Outside"],
+    "filters.posterior": ["Posterior"],
     "filters.own_doppler": ["track_range_rate"],
     "filters.particle": ["bearing_particles", "particle_filter"],
     "experiments.scenario": ["Scenario"],

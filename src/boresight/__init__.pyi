@@ -12,9 +12,12 @@ from boresight.experiments.scenario import Scenario as Scenario
 from boresight.experiments.sets import gospa as gospa
 from boresight.experiments.sets import ospa as ospa
 from boresight.experiments.simulate import simulate as simulate
+from boresight.filters.method import Filter as Filter
+from boresight.filters.method import Outside as Outside
 from boresight.filters.own_doppler import track_range_rate as track_range_rate
 from boresight.filters.particle import bearing_particles as bearing_particles
 from boresight.filters.particle import particle_filter as particle_filter
+from boresight.filters.posterior import Posterior as Posterior
 from boresight.interfaces.calibration import calibrate as calibrate
 from boresight.interfaces.calibration import read_calibration as read_calibration
 from boresight.interfaces.calibration import write_calibration as write_calibration

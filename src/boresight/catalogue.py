@@ -1,4 +1,8 @@
-"""Every filter by name: the only list. `boresight cite NAME` prints where a filter comes from."""
+"""Every filter by name: the only list. `boresight cite NAME` prints where a filter comes from.
+
+Other packages add filters of theirs by entry points (`filters.plugins`); a filter that somebody
+holds in the hand is taken wherever a name is.
+"""
 
 import re
 from importlib import resources
@@ -6,11 +10,11 @@ from inspect import getdoc, getmodule
 from typing import Any, NamedTuple
 
 from boresight.errors import UsageError, unknown
-from boresight.filters import ekf, kalman, mekf, mgekf, sigma, spherical
+from boresight.filters import ekf, kalman, mekf, mgekf, plugins, sigma, spherical
 from boresight.filters.converted import Converted
 from boresight.filters.error_model import correct
 from boresight.filters.line_of_sight import LineOfSight
-from boresight.filters.method import Filter
+from boresight.filters.method import Filter, Outside
 from boresight.filters.modified_polar import ModifiedPolar
 from boresight.filters.range_rate import RangeRate
 from boresight.mixtures.range_parameterised import RangeParameterised
@@ -183,13 +187,34 @@ _PASSES = dict.fromkeys(("error-model", "ecmkf", "emekf"), _Pass(correct))
 _THEN = {"ecmkf": ('frame="cartesian"', "kf"), "emekf": ('frame="polar"', "mekf")}
 
 
+OWN: tuple[str, ...] = tuple(_FILTERS)  # boresight's own, whatever else is installed
+
+
 def names() -> tuple[str, ...]:
-    """Names of all filters."""
-    return tuple(_FILTERS)
+    """Names of all filters: ours, then those that other installed packages offer."""
+    return (*OWN, *plugins.offered(_FILTERS))
 
 
-def lookup(name: str) -> Filter:
-    """The filter of that name; UsageError with the nearest valid name if there is none."""
+def lookup(name: Any) -> Filter:
+    """The filter of that name, or the filter itself where one is given.
+
+    Raises:
+        UsageError: there is none, with the nearest valid name; or it is a function over whole
+            recordings, of which there is no step to run.
+    """
+    found = find(name)
+    if isinstance(found, Outside):
+        raise UsageError(
+            f"{found.name} is a function over whole recordings: there is no step of it to run",
+            next_step="give it to bs.run or bs.compare",
+        )
+    return found
+
+
+def find(name: Any) -> Filter | Outside:
+    """As `lookup`, functions over whole recordings included."""
+    if not isinstance(name, str):
+        return plugins.as_filter(name)
     if name in _FILTERS:
         return _FILTERS[name]
     if name in _THEN:
@@ -199,15 +224,19 @@ def lookup(name: str) -> Filter:
             next_step=f'found = bs.error_model(plots, reference, radar, model="kashyap", {frame}); '
             f'bs.run("{entry}", motion, found.sensor, found.plots)',
         )
-    raise unknown("filter", name, _FILTERS)
+    others = plugins.offered(_FILTERS)
+    if name in others:
+        return plugins.loaded(name, others[name])
+    raise unknown("filter", name, [*OWN, *others])
 
 
 def cite(name: str) -> dict[str, str]:
     """Where a filter, or the error model, is from: `key`, `bibtex`, and how ours `differs`."""
-    known: dict[str, Any] = _FILTERS | _PASSES
-    if name not in known:
-        raise unknown("filter", name, known)
-    entry = known[name]
+    if name not in _PASSES and name not in (known := names()):
+        raise unknown("filter", name, [*known, *_PASSES])
+    entry: Any = _PASSES[name] if name in _PASSES else find(name)
+    if not getattr(entry, "paper", ""):
+        raise UsageError(f"{name} names no paper", next_step="ask whoever wrote it")
     text = (resources.files("boresight") / "papers.bib").read_text(encoding="utf-8")
     found = re.search(rf"^@\w+\{{{re.escape(entry.paper)},.*?^\}}", text, re.MULTILINE | re.DOTALL)
     if found is None:

@@ -149,7 +149,7 @@ class Recursion:
 
     def states(self, start: Gaussian, lanes: int) -> States:
         """Blocked states from mean (n,) or (lanes, n) and cov (n, n) or (lanes, n, n)."""
-        mean, cov = _spread(start, lanes)
+        mean, cov = spread(start, lanes)
         slots = tuple(Slot(name, leaf) for name, leaf in self.layout.items())
         if self.method.plain:
             return pack_states(slots, {"mean": mean, "cov": cov})
@@ -225,7 +225,7 @@ def _full(leaf: Leaf) -> Leaf:
     return Matrix(*leaf.shape) if leaf.symmetric else leaf
 
 
-def _spread(start: Gaussian, lanes: int) -> tuple[Array, Array]:
+def spread(start: Gaussian, lanes: int) -> tuple[Array, Array]:
     """Mean (lanes, n) and cov (lanes, n, n) of a Gaussian whose leading axis may be absent."""
     n = np.shape(start.mean)[-1]
     leading = {*np.shape(start.mean)[:-1], *np.shape(start.cov)[:-2]}

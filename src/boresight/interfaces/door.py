@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from boresight.errors import OutputError, UsageError, unknown
 
 if TYPE_CHECKING:
-    from boresight.filters.method import Filter
+    from boresight.filters.method import Filter, FilterLike
     from boresight.maths.frames import Site
     from boresight.models.atmosphere import Atmosphere
     from boresight.target_motion.result import Criteria
@@ -115,30 +115,33 @@ def sensor(text: str, known: Sequence[str]) -> str:
 FILTER, ALL = "mekf", "all"
 
 
-def filters(texts: Sequence[str]) -> "tuple[list[Filter], bool]":
-    """Read filters' names, each text one or several parted by commas, `all` among them or not.
+def filters(given: "Sequence[FilterLike]") -> "tuple[list[Filter], bool]":
+    """Read filters, or their names, one or several parted by commas, `all` among them or not.
 
     Returns:
-        The filters in the order of their names, the first to be tracked with, and whether `all`
-        was said: the rest of the catalogue then follows, as far as it can take the plots.
+        The filters in the order they were given, the first to be tracked with, and whether `all`
+        was said: the rest of our own then follows, as far as it can take the plots.
 
     Raises:
         UsageError: a name that the catalogue does not have, or has been said before.
     """
     from boresight import catalogue
 
-    said = [name.strip() for text in texts for name in text.split(",")]
-    twice = next((name for i, name in enumerate(said) if name in said[:i]), None)
+    said: list[Any] = []
+    for each in given:
+        said += [name.strip() for name in each.split(",")] if isinstance(each, str) else [each]
+    chosen = [catalogue.lookup(each) for each in said if each != ALL]
+    named = [each.name for each in chosen]
+    twice = next((name for i, name in enumerate(named) if name in named[:i]), None)
     if twice:
         raise UsageError(
             f"the filter {twice!r} is named twice",
-            next_step=f"--filter {','.join(dict.fromkeys(said))}",
+            next_step=f"--filter {','.join(dict.fromkeys(named))}",
         )
-    chosen = [catalogue.lookup(name) for name in said if name != ALL]
     if ALL in said:
         chosen = chosen or [catalogue.lookup(FILTER)]
         named = [each.name for each in chosen]
-        chosen += [catalogue.lookup(name) for name in catalogue.names() if name not in named]
+        chosen += [catalogue.lookup(name) for name in catalogue.OWN if name not in named]
     return chosen, ALL in said
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from boresight import catalogue
 from boresight.errors import UsageError
-from boresight.filters.recursion import Estimate, Recursion, run_recursion
+from boresight.filters.method import FilterLike, Outside
+from boresight.filters.recursion import Estimate, Recursion, run_recursion, spread
 from boresight.filters.smoother import smooth as smooth_lanes
 from boresight.filters.start import two_plots
 from boresight.filters.stream import Stream
@@ -36,7 +37,7 @@ _STARTS = {"one plot": 1, "two plots": 2}
 
 
 def run(
-    name: str,
+    name: FilterLike | Outside,
     motion: Motion,
     sensor: Sensor,
     plots: Any,
@@ -52,7 +53,7 @@ def run(
     """Filter many runs at once.
 
     Args:
-        name: a filter of the catalogue, such as "ekf" or "mekf".
+        name: of a filter of the catalogue, such as "ekf" or "mekf"; or a filter of your own.
         motion: how the targets move.
         sensor: what measured the plots.
         plots: what `simulate` gives, or an array (runs, scans, k) in SI units and radians with
@@ -64,7 +65,8 @@ def run(
             start). Left out: what `plots` carries, else "one plot".
         speed_mps: spread of each velocity of a start from one plot; left out, the filter's own: 300
             for radars' targets, 11 for a bank's contacts at sea.
-        outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status.
+        outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status; of an `Outside`
+            there are mean and cov.
         last: give outputs after the last scan only.
         threads: threads that share the runs; the result does not depend on it.
         settings: the filter's own, such as `mu="none"` for the MEKF.
@@ -78,7 +80,9 @@ def run(
             that goes backwards.
     """
     given.models(motion, sensor)
-    recursion = catalogue.lookup(name).with_settings(**settings).recursion(motion, sensor)
+    chosen = catalogue.find(name)
+    step = catalogue.lookup("ekf") if isinstance(chosen, Outside) else chosen
+    recursion = step.with_settings(**settings).recursion(motion, sensor)
     z = given.plots(getattr(plots, "z", plots), sensor)
     steps = given.steps(getattr(plots, "dt", None) if dt is None else dt, *z.shape[:2])
     given.fit(recursion, *z.shape[:2])
@@ -88,8 +92,29 @@ def run(
     if prior is None or isinstance(prior, str):
         prior, z, steps = _start_from_plots(prior or "one plot", z, steps, recursion, speed_mps)
     prior = given.start(prior, motion)
+    if isinstance(chosen, Outside):
+        return _run_outside(chosen, motion, sensor, z, steps, prior, last=last)
     found = run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
     return replace(found, others=found.others | {"dt": steps})
+
+
+def _run_outside(
+    outside: Outside,
+    motion: Motion,
+    sensor: Sensor,
+    z: Array,
+    dt: Array,
+    start: Gaussian,
+    *,
+    last: bool,
+) -> Estimate:
+    """What a function over whole recordings says; of the steps between it tells nothing."""
+    rows = np.shape(dt)[0] if np.ndim(dt) else 1
+    steps = np.broadcast_to(np.asarray(dt, dtype=float), (rows, z.shape[1]))
+    said = outside(z, steps, Gaussian(*spread(start, len(z))), motion, sensor)
+    mean, cov = (array[:, -1] if last else array for array in said)
+    others = {"mean": mean, "cov": cov, "dt": dt}
+    return Estimate(others, final=None)  # type: ignore[arg-type] # there is none to go on from
 
 
 def smooth(
@@ -161,12 +186,17 @@ def _start_from_plots(
 
 
 def stream(
-    name: str, motion: Motion, sensor: Sensor, *, targets: int | None = None, **settings: Any
+    name: FilterLike,
+    motion: Motion,
+    sensor: Sensor,
+    *,
+    targets: int | None = None,
+    **settings: Any,
 ) -> Stream:
     """A filter fed plot by plot, live; state in, state out.
 
     Args:
-        name: a filter of the catalogue.
+        name: of a filter of the catalogue, or a filter of your own.
         motion: how the target moves.
         sensor: what measures it.
         targets: None for one target; a number for that many at once.
@@ -192,8 +222,8 @@ def track(
     *,
     site: Site | tuple[float, float, float] | None = None,
     sensor: str | None = None,
-    filter: str = door.FILTER,  # noqa: A002 - the field's word
-    compare: Sequence[str] | Literal["all"] = (),
+    filter: FilterLike = door.FILTER,  # noqa: A002 - the field's word
+    compare: Sequence[FilterLike] | FilterLike = (),
     calibration: "Calibration | str | PathLike[str] | None" = None,
     atmosphere: Atmosphere | str | None = None,
 ) -> "TrackingResult":
@@ -203,9 +233,10 @@ def track(
         plots: what `read` gives.
         site: of the radar: latitude and longitude in degrees, height above the ellipsoid in m.
         sensor: "SAC/SIC", if the plots are of several.
-        filter: of the catalogue.
-        compare: further filters to run on the same plots with the same noise, or "all" that can
-            take them; the result's `filters` and `scores`, and the report, set them side by side.
+        filter: a name of the catalogue, or a filter of your own.
+        compare: further filters to run on the same plots with the same noise, or "all" of ours that
+            can take them; the result's `filters` and `scores`, and the report, set them side by
+            side.
         calibration: what `calibrate` found, or its calibration.toml: plots are corrected by it, its
             noise is used, and what it leaves uncertain is in the covariances (Schmidt).
         atmosphere: the air whose delay is taken out of the ranges, such as
@@ -214,7 +245,7 @@ def track(
     from boresight.tracking.tracker import track as track_plots
 
     (first, *others), is_all = door.filters(
-        [filter, *([compare] if isinstance(compare, str) else compare)]
+        [filter, *(compare if isinstance(compare, list | tuple) else [compare])]
     )
     air = door.atmosphere(atmosphere)
     using = applied(calibration, plots, site=door.place(site), sensor=sensor, atmosphere=air)

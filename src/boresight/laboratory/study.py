@@ -5,13 +5,12 @@ contender in every setting; a cell and a run number say every random number that
 a study can be cut into chunks of runs that any thread, process or machine does in any order.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from boresight.errors import UsageError
 from boresight.experiments.scenario import Scenario
-from boresight.filters.method import Filter
+from boresight.filters.method import Filter, Outside
 from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
 
@@ -33,21 +32,6 @@ Metric = Literal[
 ]
 METRICS: tuple[Metric, ...] = get_args(Metric)
 USUAL: tuple[Metric, ...] = ("rmse", "bias", "nees", "nis", "bound", "divergence")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outside:
-    """A filter that is a function over whole recordings, of which nothing can be recorded.
-
-    Attributes:
-        name: what it is called.
-        function: (z, dt, start, motion, sensor) -> (mean, cov): plots (runs, scans, k) with NaN
-            where missing, dt (1, scans) in s, a `Gaussian` (runs, n), (runs, n, n) to begin with,
-            the believed models; to mean (runs, scans, n) and cov (runs, scans, n, n).
-    """
-
-    name: str
-    function: Callable[..., tuple[Array, Array]]
 
 
 @dataclass(frozen=True, kw_only=True)
