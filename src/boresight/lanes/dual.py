@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from boresight.lanes.refusals import forbid
+from boresight.lanes.philox import philox
+from boresight.lanes.refusals import forbid, refuse
 from boresight.lanes.trace import Symbol, recorded_power
 
 Array = Any  # float64 outside a trace, object (symbols) inside one
@@ -213,6 +214,23 @@ def copysign(magnitude: Any, sign: Any) -> Any:
     if isinstance(magnitude, Symbol):
         return magnitude.copysign(sign)
     return np.copysign(magnitude, sign)
+
+
+def random_pair(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, Any]:
+    """Two numbers of 52 bits in (0, 1), a function of a counter and a key (Philox4x32-10).
+
+    Args:
+        counter: four whole numbers below 2^32: floats, arrays that broadcast, or symbols.
+        key: two such numbers.
+    """
+    words = (*counter, *key)
+    graph = next((word.graph for word in words if isinstance(word, Symbol)), None)
+    if graph is None:
+        return philox(*words)
+    lifted = [word for word in map(graph.lift, words) if word is not None]
+    if len(lifted) < len(words):
+        refuse("random numbers of an array", "pass floats or recorded numbers")
+    return graph.apply("philox0", *lifted), graph.apply("philox1", *lifted)
 
 
 def _seed(x: Array) -> Array:

@@ -79,14 +79,18 @@ def _floor(x: Any) -> Any:
     return nearest - select(x < nearest, 1.0, 0.0)
 
 
+def near_zero(r: Any) -> tuple[Any, Any]:
+    """Sine and cosine of an angle in +-pi/4; of floats and arrays too."""
+    z = r * r
+    sine = r + r * (z * _horner(_SIN, z))
+    return sine, (1.0 - 0.5 * z) + z * z * _horner(_COS, z)
+
+
 def _quadrant(x: Any) -> tuple[Any, Any, Any]:
     """Sine and cosine of the remainder in +-pi/4, and the quadrant 0 to 3."""
     n = (x * (2.0 / math.pi)).rint()
     r = ((x - n * _HALF_PI[0]) - n * _HALF_PI[1]) - n * _HALF_PI[2]
-    z = r * r
-    sine = r + r * (z * _horner(_SIN, z))
-    cosine = (1.0 - 0.5 * z) + z * z * _horner(_COS, z)
-    return sine, cosine, n - 4.0 * (n * 0.25).floor()
+    return *near_zero(r), n - 4.0 * (n * 0.25).floor()
 
 
 def _in_range(x: Any, y: Any) -> Any:
@@ -144,6 +148,8 @@ def log(x: Any) -> Any:
     half_square = 0.5 * f * f
     tail = s * (half_square + z * _horner(_LOG, z)) + e * _LN2[1]
     value = e * _LN2[0] - ((half_square - tail) - f)
+    if x.graph.nodes[x.index][0] in ("philox0", "philox1"):  # a number in (0, 1)
+        return value
     value = select(x <= 0.0, select(x < 0.0, math.nan, -math.inf), value)
     return select(x < math.inf, value, x)
 

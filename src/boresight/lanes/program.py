@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import FormulaError, UsageError
+from boresight.lanes.philox import COST
 from boresight.lanes.refusals import located
 from boresight.lanes.trace import COMPARISONS, Graph
 
 Array = Any
 _NUMPY_S = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError)  # what it raises
 LARGEST = 8_000  # operations; compile time grows faster than linearly above it
+_COSTS = {"const": 0, "input": 0, "philox0": COST, "philox1": COST}
 
 
 class Rate(IntFlag):
@@ -144,8 +146,9 @@ class Program:
     def operations(self) -> int:
         """Arithmetic operations of one step and lane; hoisted work is not counted."""
         return sum(
-            rate == Rate.EACH and op not in ("const", "input")
+            _COSTS.get(op, 1)
             for (op, _), rate in zip(self.nodes, self.rates, strict=True)
+            if rate == Rate.EACH
         )
 
     @property

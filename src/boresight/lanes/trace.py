@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from boresight.lanes.philox import philox
 from boresight.lanes.refusals import forbid, refuse
 
 # Operations that only a boolean results from; everything else is a float.
@@ -50,6 +51,8 @@ FOLD: dict[str, Callable[..., Any]] = {
     "pow2": np.exp2,
     "exponent": lambda x: np.frexp(x)[1] - 1.0,
     "mantissa": lambda x: np.frexp(x)[0] * 2.0,
+    "philox0": lambda *words: philox(*words)[0],
+    "philox1": lambda *words: philox(*words)[1],
 }
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from boresight.lanes.philox import KEY_STEPS, MULTIPLIERS, ROUNDS
 from boresight.lanes.program import Program, Rate, is_condition
 
 _BINARY = {"add": "fadd contract", "sub": "fsub contract", "mul": "fmul contract"}
@@ -9,6 +10,8 @@ _BINARY |= {"div": "fdiv contract", "scale": "fmul"}  # a scaled half turn must 
 _CALLS = {"sqrt": "sqrt", "abs": "fabs", "rint": "rint", "floor": "floor", "copysign": "copysign"}
 _CONDITIONS = {"lt": "fcmp olt", "le": "fcmp ole", "isnan": "fcmp uno"}
 _LOGIC = {"and": "and", "or": "or"}
+_PHILOX = {"philox0": 0, "philox1": 1}
+_LOW = 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,7 @@ class Writer:
         self.vector = _vector(shape.width)
         self.splats: dict[int, str] = {}
         self.temporaries = 0
+        self.blocks: dict[tuple[int, ...], list[str]] = {}  # random words, by counter and key
         self.kinds = [self.vector if rate & Rate.LANE else SCALAR for rate in program.rates]
         self.elements: dict[str, list[tuple[int, int]]] = {}  # of an input: (element, node)
         for node, (op, args) in enumerate(program.nodes):
@@ -98,6 +102,8 @@ class Writer:
 
     def operation(self, op: str, args: tuple[int, ...], kind: Kind) -> str:
         """The right-hand side of an operation."""
+        if op in _PHILOX:
+            return self.random(args, _PHILOX[op], kind)
         x = [self.value(a, kind) for a in args]
         if op in _BINARY:
             return f"{_BINARY[op]} {kind.number} {x[0]}, {x[1]}"
@@ -137,3 +143,44 @@ class Writer:
         biased = self.emit(f"or {kind.integer} {exponent}, {c(0x4330000000000000)}")
         number = self.emit(f"bitcast {kind.integer} {biased} to {kind.number}")
         return f"fsub {kind.number} {number}, {self.constant('0x43300000000003FF', kind)}"
+
+    def random(self, args: tuple[int, ...], half: int, kind: Kind) -> str:
+        """One number of a random block; its other number shares the work."""
+        if (
+            args not in self.blocks
+        ):  # nodes of equal arguments have equal rates: the first dominates
+            self.blocks[args] = self.scrambled([self.value(a, kind) for a in args], kind)
+        high, low = self.blocks[args][2 * half : 2 * half + 2]
+        left = self.whole("shl", high, 20, kind)
+        upper = self.whole("and", left, 0x000FFFFFFFF00000, kind)
+        low = self.whole("and", low, _LOW, kind)
+        fraction = self.emit(f"or {kind.integer} {upper}, {self.whole('lshr', low, 12, kind)}")
+        one = self.whole("or", fraction, 0x3FF0000000000000, kind)
+        number = self.emit(f"bitcast {kind.integer} {one} to {kind.number}")
+        return f"fsub {kind.number} {number}, {self.constant('0x3FEFFFFFFFFFFFFF', kind)}"
+
+    def scrambled(self, words: list[str], kind: Kind) -> list[str]:
+        """Four random words of 32 bits, with anything above those; see philox.py."""
+        magic = self.constant("0x4330000000000000", kind)  # 2**52: adding it bares the bits
+        bits = [self.emit(f"fadd {kind.number} {word}, {magic}") for word in words]
+        *c, k0, k1 = [self.emit(f"bitcast {kind.number} {x} to {kind.integer}") for x in bits]
+        for _ in range(ROUNDS):
+            p, q = (
+                self.whole("mul", self.whole("and", x, _LOW, kind), by, kind)
+                for x, by in zip((c[0], c[2]), MULTIPLIERS, strict=True)
+            )
+            mixed = []
+            for product, word, key in ((q, c[1], k0), (p, c[3], k1)):
+                keyed = self.emit(f"xor {kind.integer} {word}, {key}")
+                high = self.whole("lshr", product, 32, kind)
+                mixed.append(self.emit(f"xor {kind.integer} {keyed}, {high}"))
+            c = [mixed[0], q, mixed[1], p]
+            k0, k1 = (
+                self.whole("add", k, step, kind)
+                for k, step in zip((k0, k1), KEY_STEPS, strict=True)
+            )
+        return c
+
+    def whole(self, op: str, x: str, by: int, kind: Kind) -> str:
+        """An operation of whole numbers, whose second one is a constant."""
+        return self.emit(f"{op} {kind.integer} {x}, {self.constant(str(by), kind, 'i64')}")

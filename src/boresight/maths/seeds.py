@@ -1,20 +1,25 @@
 """Random numbers that depend on what they are for, and on nothing else.
 
-Philox is a counter-based generator: its numbers are a function of a key and a counter. The key is
-the user's seed and the name of the cell (a scenario, a cell of a study); the counter's upper half
-is the run and what the numbers are for. So run 7 of 10 has the numbers of run 7 of 1,000, in any
-chunk, thread or process; truth and noise can be redrawn apart; and two filters, or two sensors,
-that share a cell share its numbers.
+The numbers are those of `maths.random`, functions of a key (the user's seed and the name of a
+cell: a scenario, a cell of a study), of the run, of the step and of what they are for. So run 7 of
+10 has the numbers of run 7 of 1,000, in any chunk, thread or process; truth and noise can be
+redrawn apart; two filters, or two sensors, that share a cell share its numbers; and what a kernel
+makes inside itself, `normals` makes again.
 
 [salmon2011] J. K. Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3".
 """
 
 import hashlib
+import math
 from enum import IntEnum
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.lanes import Kernel, Rate, Scalar, Vector, make_kernel, pack_states, trace
+from boresight.maths import random
 from boresight.maths.gaussian import Array
 
 _WORD = 2**64
@@ -39,7 +44,7 @@ def normals(
         seed: the user's seed, 0 to 2^64 - 1.
         cell: name of the scenario or cell.
         stream: what the numbers are for.
-        shape: of one run.
+        shape: of one run: (steps, ...), or (count,) of step 0.
         runs: number of runs.
         first: number of the first run, so that chunks of runs can be made apart.
 
@@ -50,20 +55,43 @@ def normals(
         UsageError: a seed or a number of runs that is out of range.
     """
     _check(seed, runs, first)
-    bits = np.random.Philox(key=np.array([seed, _hash(cell)], dtype=np.uint64))
-    generator, state = np.random.Generator(bits), bits.state
-    counter = state["state"]["counter"]
-    rows = np.empty((runs, *shape))
-    for i in range(runs):
-        # Making a generator takes 40 us, for entropy that the key replaces; moving one takes 3.
-        counter[:] = (0, 0, first + i, stream)
-        bits.state = state
-        generator.standard_normal(out=rows[i])
-    return rows
+    steps, count = (shape[0], math.prod(shape[1:])) if len(shape) > 1 else (1, math.prod(shape))
+    step, pair = np.indices((steps, (count + 1) // 2)).reshape(2, -1)  # a kernel's step is a pair
+    kernel = _kernel()
+    start = pack_states(kernel.program.state, {"run": first + np.arange(runs)})
+    inputs = {"key": random.key(seed, cell), "stream": stream, "step": step, "pair": pair}
+    drawn = kernel.run(start, inputs, len(step))[1]["normals"].reshape(runs, steps, -1)
+    return np.ascontiguousarray(drawn[..., :count]).reshape(runs, *shape)
+
+
+@cache
+def _kernel() -> Kernel:
+    """A pair of normal numbers."""
+
+    def step(state: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
+        counter = (state["run"], inputs["step"], inputs["stream"], inputs["pair"])
+        drawn = random.normal_pair(*random.pair(inputs["key"], *counter))
+        return state, {"normals": np.array(drawn)}
+
+    program = trace(
+        step,
+        state={"run": Scalar()},
+        inputs={
+            "key": (Vector(2), Rate.FIXED),
+            "stream": (Scalar(), Rate.FIXED),
+            "step": (Scalar(), Rate.STEP),
+            "pair": (Scalar(), Rate.STEP),
+        },
+        outputs={"normals": (Vector(2), Rate.EACH)},
+    )
+    return make_kernel(program)
 
 
 def generator(seed: int, cell: str, stream: Stream, run: int) -> np.random.Generator:
-    """Numbers of any kind and any count for one run: the stream whose start `normals` draws."""
+    """Numbers of any kind and any count for one run, as particles need them.
+
+    NumPy's own Philox, of 64-bit words, under a key of its own: not the numbers of `normals`.
+    """
     _check(seed, 1, run)
     key = np.array([seed, _hash(cell)], dtype=np.uint64)
     return np.random.Generator(np.random.Philox(counter=[0, 0, run, stream], key=key))
@@ -77,6 +105,11 @@ def _check(seed: int, runs: int, first: int) -> None:
         raise UsageError(f"seed={seed} is outside 0 to 2^64 - 1", next_step="give another seed")
     if runs < 1 or first < 0:
         raise UsageError(f"runs={runs}, first={first}: at least one run is needed, from 0 up")
+    if first + runs - 1 > random.LARGEST:
+        raise UsageError(
+            f"runs={runs}, first={first}: the last run's number is above 2^32 - 1",
+            next_step="give another seed instead",
+        )
 
 
 def _hash(cell: str) -> int:
