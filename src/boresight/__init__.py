@@ -44,11 +44,13 @@ _WHERE = {
     "experiments.metrics": ["anees", "rmse"],
     "experiments.sets": ["gospa", "ospa"],
     "experiments.reproduce": ["reproduce"],
+    "laboratory.study": ["Contender", "Limits", "Setting", "Study"],
     "interfaces.converting": ["convert"],
     "interfaces.error_models": ["error_model"],
     "calibration.correcting": ["correct"],
     "interfaces.calibration": ["calibrate", "read_calibration", "write_calibration"],
     "interfaces.contacts": ["tma"],
+    "interfaces.studies": ["compare"],
     "interfaces.reading": ["read"],
     "interfaces.python": ["inspect", "report", "run", "smooth", "stream", "track"],
 }

@@ -31,6 +31,11 @@ from boresight.interfaces.python import smooth as smooth
 from boresight.interfaces.python import stream as stream
 from boresight.interfaces.python import track as track
 from boresight.interfaces.reading import read as read
+from boresight.interfaces.studies import compare as compare
+from boresight.laboratory.study import Contender as Contender
+from boresight.laboratory.study import Limits as Limits
+from boresight.laboratory.study import Setting as Setting
+from boresight.laboratory.study import Study as Study
 from boresight.maths.frames import Site as Site
 from boresight.maths.gaussian import Gaussian as Gaussian
 from boresight.models.atmosphere import EffectiveEarth as EffectiveEarth

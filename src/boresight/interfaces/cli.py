@@ -14,6 +14,7 @@ from boresight.errors import BoresightError, UsageError
 from boresight.interfaces import (
     analysing,
     calibrating,
+    comparing,
     contacts,
     door,
     jobs,
@@ -199,6 +200,48 @@ def tma(
 def demo(*, output: options.Output = Path("boresight-demo")) -> Job:
     """Calibrate and track the built-in recording, against known truth."""
     return partial(jobs.demo, output)
+
+
+@app.command
+def compare(
+    study: options.StudyFile,
+    /,
+    *,
+    runs: options.Runs = None,
+    seed: options.Seed = None,
+    engine: options.Engine = "threads",
+    workers: options.Workers = None,
+    scheduler: options.Scheduler = None,
+    chunk: options.Chunk = None,
+    resume: options.Resume = False,
+    output: options.StudyFolder = None,
+) -> Job:
+    """Compare filters over many runs of a study, with bounds and verdicts."""
+    return partial(
+        comparing.compare,
+        study,
+        runs=runs,
+        seed=seed,
+        engine=engine,
+        workers=workers,
+        scheduler=scheduler,
+        chunk=chunk,
+        resume=resume,
+        folder=output,
+    )
+
+
+@app.command
+def simulate(
+    study: options.StudyFile,
+    /,
+    *,
+    runs: options.Runs = None,
+    seed: options.Seed = None,
+    output: options.Simulated = Path("simulated"),
+) -> Job:
+    """Write the truth and the plots of a study, as tables."""
+    return partial(comparing.simulate, study, runs=runs, seed=seed, folder=output)
 
 
 @app.command

@@ -1,7 +1,7 @@
 """What the commands' options are called, mean, and default to, as their help shows them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -162,3 +162,42 @@ PositionError = Annotated[
         help="How well own ship's track is known, m: what wanders by as much is no manoeuvre."
     ),
 ]
+
+# Of the laboratory.
+StudyFile = Annotated[
+    Path, Parameter(help="A study.toml: scenario, sensor, filters, and what is swept.")
+]
+Runs = Annotated[int | None, Parameter(help="Runs of each cell, instead of the study's.")]
+Seed = Annotated[int | None, Parameter(help="Seed, instead of the study's.")]
+Engine = Annotated[
+    Literal["threads", "processes", "dask", "local"],
+    Parameter(
+        help="What does the work: threads of this process (local is the same), processes of this "
+        "machine, or a Dask cluster. The numbers are the same."
+    ),
+]
+Workers = Annotated[
+    int | None,
+    Parameter(show_default=lambda _: "all cores", help="How many threads or processes."),
+]
+Scheduler = Annotated[
+    str | None, Parameter(help="Of the Dask cluster: tcp://host:port, for --engine dask.")
+]
+Chunk = Annotated[int | None, Parameter(help="Runs done at once; the numbers do not depend on it.")]
+Resume = Annotated[
+    bool,
+    Parameter(
+        negative="",
+        show_default=False,
+        help="Go on with what the folder given by -o holds of an interrupted study.",
+    ),
+]
+StudyFolder = Annotated[
+    Path | None,
+    Parameter(
+        alias="-o",
+        help="Folder for report.html and the tables of cells, runs and scans; finished chunks are "
+        "kept there too, for --resume.",
+    ),
+]
+Simulated = Annotated[Path, Parameter(alias="-o", help="Folder for the tables.")]

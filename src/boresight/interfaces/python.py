@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from boresight.calibration.result import Calibration
     from boresight.interfaces.report import Report
+    from boresight.laboratory.result import StudyResult
     from boresight.target_motion.result import TmaResult
     from boresight.tracking.result import TrackingResult
 
@@ -254,14 +255,15 @@ def track(
 
 
 def report(
-    tracks: "TrackingResult | Calibration | TmaResult | None" = None,
+    tracks: "TrackingResult | Calibration | TmaResult | StudyResult | None" = None,
     calibration: "Calibration | None" = None,
     **about: Any,
 ) -> "Report":
     """A report on one page: `.html`, `.save(path)`, and shown by itself in a notebook.
 
     Args:
-        tracks: what `track` gives; or what `calibrate` or `tma` gives, for a page about that alone.
+        tracks: what `track` gives; or what `calibrate`, `tma` or `compare` gives, for a page about
+            that alone.
         calibration: what `calibrate` gives, for a page about both.
         about: `inspection`, what `inspect` says of the file, and `command`, as the page shows them.
 
@@ -270,10 +272,11 @@ def report(
     """
     from boresight.calibration.result import Calibration
     from boresight.interfaces.report import report as build
+    from boresight.laboratory.result import StudyResult
     from boresight.target_motion.result import TmaResult
     from boresight.tracking.result import TrackingResult
 
-    first = TrackingResult | Calibration | TmaResult
+    first = TrackingResult | Calibration | TmaResult | StudyResult
     for value, kind in ((tracks, first), (calibration, Calibration)):
         if value is not None and not isinstance(value, kind):
             raise UsageError(
@@ -284,4 +287,6 @@ def report(
         return build(calibration=tracks, **about)
     if isinstance(tracks, TmaResult):
         return build(motion=tracks, calibration=calibration, **about)
+    if isinstance(tracks, StudyResult):
+        return build(study=tracks, calibration=calibration, **about)
     return build(tracks, calibration=calibration, **about)

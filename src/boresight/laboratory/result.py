@@ -2,9 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boresight.laboratory.study import Study
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Array = Any
 
@@ -101,3 +104,42 @@ class StudyResult:
     comparisons: tuple[Comparison, ...]
     digest: str
     remarks: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> "pl.DataFrame":
+        """A row for each cell."""
+        from boresight.laboratory.frames import cells_frame
+
+        return cells_frame(self)
+
+    @property
+    def every_run(self) -> "pl.DataFrame":
+        """A row for each run of each cell."""
+        from boresight.laboratory.frames import runs_frame
+
+        return runs_frame(self)
+
+    @property
+    def every_scan(self) -> "pl.DataFrame":
+        """A row for each scan of each cell: means over runs."""
+        from boresight.laboratory.frames import scans_frame
+
+        return scans_frame(self)
+
+    def __repr__(self) -> str:
+        lines = [f"{self.study.name}: {self.study.runs:,} runs, seed {self.study.seed}"]
+        for cell in self.cells:
+            swept = " ".join(f"{name}={value}" for name, value in cell.values)
+            low, high = cell.anees_bounds
+            lines.append(
+                f"  {cell.label:<16} {swept} position {cell.position_rmse_m.value:.4g} m, "
+                f"{cell.ratio_to_bound:.3f} of the bound, ANEES {cell.anees.value:.3g} "
+                f"({low:.3f} to {high:.3f}), {100 * cell.diverged.value:.2g} % diverged"
+            )
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """The ranking and the errors against the bound, in a notebook."""
+        from boresight.laboratory.notebook import html
+
+        return html(self)

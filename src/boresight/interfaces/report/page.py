@@ -12,11 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 from boresight.errors import OutputError, UsageError
 from boresight.interfaces.answers import plain
-from boresight.interfaces.report import calibrated, charts, sections, tma_page, tracks
+from boresight.interfaces.report import (
+    calibrated,
+    charts,
+    sections,
+    study_page,
+    tma_page,
+    tracks,
+)
 from boresight.interfaces.report.sections import Part
 
 if TYPE_CHECKING:
     from boresight.calibration.result import Calibration
+    from boresight.laboratory.result import StudyResult
     from boresight.target_motion.result import TmaResult
     from boresight.tracking.result import Comparison, TrackingResult
 
@@ -70,8 +78,9 @@ def report(
     as_seen: "Sequence[Comparison]" = (),
     calibration: "Calibration | None" = None,
     motion: "TmaResult | None" = None,
+    study: "StudyResult | None" = None,
 ) -> Report:
-    """Make the report of a tracked recording, of a radar's calibration, of both, or of contacts.
+    """Make the report of a tracked recording, a radar's calibration, both, contacts or a study.
 
     Args:
         result: what the tracker found.
@@ -82,6 +91,7 @@ def report(
             errors, would see it without noise.
         calibration: of the radar.
         motion: what target motion analysis says of each contact.
+        study: what a comparison of filters found.
 
     Raises:
         UsageError: there is nothing to report.
@@ -94,6 +104,8 @@ def report(
         parts.append(calibrated.part(calibration, {} if parts else inspection))
     if motion is not None:
         parts.append(tma_page.part(motion))
+    if study is not None:
+        parts.append(study_page.part(study))
     if not parts:
         raise UsageError(
             "a report needs tracks, a calibration, or both", next_step="report(tracks, calibration)"

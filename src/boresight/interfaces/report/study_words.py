@@ -1,0 +1,106 @@
+"""What the pages and screens of a study say: who is ahead, who knows its errors, in what unit."""
+
+import math
+from collections.abc import Iterator, Sequence
+from html import escape
+
+from boresight.interfaces.report.verdict import Sentence
+from boresight.interfaces.report.words import figure
+from boresight.laboratory.result import Cell, Comparison, Interval, StudyResult
+
+CONSISTENT = "Every filter knows its own errors: each ANEES is in its band, and no run diverged."
+
+
+def setting_name(values: Sequence[tuple[str, str]]) -> str:
+    """What is swept: `sensor.azimuth.sigma 0.5 deg`; empty where nothing is."""
+    return ", ".join(f"{name} {value}" for name, value in values)
+
+
+def cells_of(result: StudyResult, setting: int) -> list[Cell]:
+    """The contenders of a setting, smallest position error first; no number is last."""
+    mine = [cell for cell in result.cells if cell.setting == setting]
+    return sorted(mine, key=lambda cell: _last_if_none(cell.position_rmse_m.value))
+
+
+def _last_if_none(value: float) -> float:
+    return value if math.isfinite(value) else math.inf
+
+
+def rmse(value: Interval, unit: str, digits: int = 3) -> str:
+    """Render `41.2 m`; an error that is no number is infinite."""
+    return f"{figure(value.value, digits)} {unit}" if math.isfinite(value.value) else "infinite"
+
+
+def ends(value: Interval, digits: int = 3) -> str:
+    """Render an interval: `40.8 to 41.6`; a dash where it has no ends."""
+    if not (math.isfinite(value.low) and math.isfinite(value.high)):
+        return "–"
+    return f"{figure(value.low, digits)} to {figure(value.high, digits)}"
+
+
+def consistency(cell: Cell) -> str:
+    """What the ANEES says, in two words at most."""
+    low, high = cell.anees_bounds
+    if not math.isfinite(cell.anees.value):
+        return "no number"
+    if cell.anees.value > high:
+        return "too sure"
+    return "too modest" if cell.anees.value < low else "consistent"
+
+
+def wins(result: StudyResult, setting: int, label: str) -> list[Comparison]:
+    """The comparisons that a contender wins."""
+    return [
+        c for c in result.comparisons if (c.setting, c.better, c.is_win) == (setting, label, True)
+    ]
+
+
+def beside(result: StudyResult, setting: int, label: str) -> str:
+    """Whom a contender is better than, and from whom it cannot be told."""
+    beaten = [each.other for each in wins(result, setting, label)]
+    open_ = [
+        each.other if each.better == label else each.better
+        for each in result.comparisons
+        if each.setting == setting and not each.is_win and label in (each.better, each.other)
+    ]
+    parts = [f"better than {_and(beaten)}"] if beaten else []
+    parts += [f"not told apart from {_and(open_)}"] if open_ else []
+    return "; ".join(parts)
+
+
+def _and(names: Sequence[str]) -> str:
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def sentences(result: StudyResult) -> list[Sentence]:
+    """The verdict: for each setting who is ahead, then what is to be said of each contender."""
+    return [each for i in range(len(result.study.settings)) for each in _of_setting(result, i)]
+
+
+def _of_setting(result: StudyResult, setting: int) -> Iterator[Sentence]:
+    first, *others = cells_of(result, setting)
+    where = setting_name(first.values)
+    head = f"<b>{escape(where)}</b>: " if where else ""
+    bound = (
+        f", {figure(first.ratio_to_bound, 3)} times the Cramér-Rao bound"
+        if math.isfinite(first.ratio_to_bound)
+        else ""
+    )
+    said = beside(result, setting, first.label)
+    words = "has the smallest position error" if others else "has a position error of"
+    text = f"{head}<b>{escape(first.label)}</b> {words}{': ' if others else ' '}"
+    text += f"{rmse(first.position_rmse_m, 'm')}{bound}"
+    told = f"; it is {escape(said)}" if said else ""
+    yield Sentence("good" if math.isfinite(first.position_rmse_m.value) else "attention",
+                   f"{text}{told}.", "ranking")  # fmt: skip
+    doubtful = [cell for cell in (first, *others) if is_doubtful(cell)]
+    for cell in doubtful:
+        yield Sentence("attention", f"{head}{' '.join(map(escape, cell.verdicts))}", "consistency")
+    if not doubtful:
+        yield Sentence("good", f"{head}{CONSISTENT}", "consistency")
+
+
+def is_doubtful(cell: Cell) -> bool:
+    """Whether a filter does not know its errors, or lost a run."""
+    return consistency(cell) != "consistent" or cell.diverged.value > 0
