@@ -107,9 +107,16 @@ FAULTS = (
     *faults(
         "lanes/ir.py",
         ("@llvm.umin.", "@llvm.umax."),
-        ('"%steps" if s.rate == Rate.EACH else "1"', '"%steps"'),
-        ('moved = w.emit(f"mul i64 %t, {size * BLOCK}")', 'moved = w.emit("mul i64 %t, 8")'),
         ("[ {following}, %step ]", "[ {old[node]}, %step ]"),
+    ),
+    *faults(
+        "lanes/places.py",
+        ('moved = w.emit(f"mul i64 %t, {size * BLOCK}")', 'moved = w.emit("mul i64 %t, 8")'),
+    ),
+    *faults(
+        "lanes/outputs.py",
+        ('"%steps" if slot.rate == Rate.EACH else "1"', '"%steps"'),
+        ('return w.emit(f"mul i64 %chunk, {numbers}")', 'return "0"'),
     ),
     *faults(
         "lanes/writer.py",

@@ -2,6 +2,7 @@
 
 State lives in blocks of 8 lanes, [block, number, 8], from one call to the next. Inputs and outputs
 are plain rows, which the kernel packs itself, or blocks where a caller makes data blocked already.
+What is summed over lanes is summed over each block, always.
 """
 
 import os
@@ -14,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from boresight.errors import UsageError
-from boresight.lanes.interpreter import run_numpy
-from boresight.lanes.ir import BLOCK
+from boresight.lanes.interpreter import paired, run_numpy
+from boresight.lanes.places import BLOCK
 from boresight.lanes.program import Program, Rate, Slot
 from boresight.lanes.simd import Code, compile_program
 
@@ -105,7 +106,8 @@ class Kernel:
 
         Returns:
             The new states, and the outputs by name: EACH (lanes, steps, *shape), LANE
-            (lanes, *shape); blocked and packed if the kernel is.
+            (lanes, *shape), blocked and packed if the kernel is; STEP (lanes / 8, steps, *shape),
+            sums over blocks.
 
         Raises:
             UsageError: steps, threads, the state or an input does not fit; compiled code would
@@ -117,7 +119,10 @@ class Kernel:
             return self._run_numpy(states, packed, steps, out or {})
         new = np.empty_like(states.data)
         outputs = [self._output(s, states.lanes, steps, out or {}) for s in self.program.outputs]
-        arrays = (states.data, new, *outputs, *packed)
+        written = [
+            self._scratch(s, each) for s, each in zip(self.program.outputs, outputs, strict=True)
+        ]
+        arrays = (states.data, new, *written, *packed)
         addresses = [array.__array_interface__["data"][0] for array in arrays]  # .ctypes is slow
         chunks = self.code.chunks(states.lanes)
         parts = max(1, min(threads, chunks))
@@ -131,11 +136,20 @@ class Kernel:
             part(0, chunks)
         else:
             list(_pool().map(part, cuts[:-1], cuts[1:]))
+        for whole, halves in zip(outputs, written, strict=True):
+            if whole is not halves:
+                whole[...] = paired(halves, len(whole))
         return States(states.slots, new, states.lanes), self._unpack(outputs)
 
     def _check(self, states: States, steps: int, threads: int) -> None:
         if steps < 1 or threads < 1:
             raise UsageError(f"a kernel runs at least one step; got {steps=}, {threads=}")
+        summed = [slot.name for slot in self.program.outputs if slot.rate == Rate.STEP]
+        if summed and states.lanes % BLOCK:
+            raise UsageError(
+                f"{summed[0]!r} is summed over blocks of {BLOCK} lanes; got {states.lanes} lanes",
+                next_step="fill the last block with lanes that count for nothing",
+            )
         expected = (-(-states.lanes // BLOCK), self.program.state_size, BLOCK)
         if states.data.shape != expected or not states.data.flags.c_contiguous:
             names = ", ".join(f"{slot.name} {slot.leaf.shape}" for slot in self.program.state)
@@ -163,9 +177,11 @@ class Kernel:
         return array
 
     def _output(self, slot: Slot, lanes: int, steps: int, out: Mapping[str, Array]) -> Array:
-        middle = (steps,) if slot.rate == Rate.EACH else ()
+        middle = () if slot.rate == Rate.LANE else (steps,)
         shape: tuple[int, ...] = (lanes, *middle, slot.leaf.size)
-        if not self.rows:
+        if slot.rate == Rate.STEP:
+            shape = (lanes // BLOCK, steps, slot.leaf.size)
+        elif not self.rows:
             shape = (-(-lanes // BLOCK), *middle, slot.leaf.size, BLOCK)
         given = out.get(slot.name)
         if given is None:
@@ -177,6 +193,13 @@ class Kernel:
                 why=f"the kernel writes {shape}, float64, C-contiguous",
             )
         return given
+
+    def _scratch(self, slot: Slot, output: Array) -> Array:
+        """Where the code writes an output: sums over fewer lanes than a block's are added here."""
+        parts = BLOCK // self.code.shape.width if self.code else 1
+        if slot.rate != Rate.STEP or parts == 1:
+            return output
+        return np.empty((parts * len(output), *output.shape[1:]))
 
     def _unpack(self, outputs: list[Array]) -> dict[str, Array]:
         slots = self.program.outputs
@@ -194,9 +217,12 @@ class Kernel:
             for name, a, b in zip(names, packed, blocked, strict=True)
         }
         state, outputs = run_numpy(self.program, states.lanes, steps, states.rows, rows)
-        results = [outputs[slot.name] for slot in self.program.outputs]
-        if not self.rows:
-            results = [to_blocks(a) for a in results]
+        results = [
+            outputs[slot.name]
+            if self.rows or slot.rate == Rate.STEP
+            else to_blocks(outputs[slot.name])
+            for slot in self.program.outputs
+        ]
         written = [self._output(s, states.lanes, steps, out) for s in self.program.outputs]
         for target, result in zip(written, results, strict=True):
             target[...] = result

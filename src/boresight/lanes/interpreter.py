@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from boresight.lanes.places import BLOCK
 from boresight.lanes.program import Program, Rate
 from boresight.lanes.trace import FOLD
 
@@ -29,10 +30,11 @@ def run_numpy(
             EACH (lanes, steps, size).
 
     Returns:
-        The new state, and by name the outputs: EACH (lanes, steps, size), LANE (lanes, size).
+        The new state, and by name the outputs: EACH (lanes, steps, size), LANE (lanes, size), STEP
+        (lanes / 8, steps, size).
     """
     state = np.array(state, dtype=float)
-    shapes = {Rate.EACH: (lanes, steps), Rate.LANE: (lanes,)}
+    shapes = {Rate.EACH: (lanes, steps), Rate.LANE: (lanes,), Rate.STEP: (lanes // BLOCK, steps)}
     outputs = {s.name: np.empty((*shapes[s.rate], s.leaf.size)) for s in program.outputs}
     memory: list[Any] = [None] * len(program.nodes)
     with np.errstate(all="ignore"):
@@ -42,14 +44,25 @@ def run_numpy(
             _evaluate(program, memory, {Rate.STEP, Rate.EACH}, inputs, state, t)
             for slot, numbers in zip(program.outputs, program.output_nodes, strict=True):
                 target = outputs[slot.name]
+                place = target if slot.rate == Rate.LANE else target[:, t]
                 for k, n in enumerate(numbers):
-                    (target[:, t] if slot.rate == Rate.EACH else target)[:, k] = memory[n]
+                    each = memory[n]
+                    if slot.rate == Rate.STEP:
+                        each = paired(np.broadcast_to(each, lanes), lanes // BLOCK)
+                    place[:, k] = each
             state = (
                 np.stack([np.broadcast_to(memory[n], lanes) for n in program.state_nodes], axis=-1)
                 if program.state_nodes
                 else state
             )
     return state, outputs
+
+
+def paired(parts: Array, count: int) -> Array:
+    """Sums over the first axis down to `count` of them, each of two neighbours, time after time."""
+    while len(parts) > count:
+        parts = parts[0::2] + parts[1::2]
+    return parts
 
 
 def _evaluate(

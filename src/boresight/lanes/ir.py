@@ -7,21 +7,22 @@ in one instruction and blocks of 8 lanes in memory:
     for each chunk of W lanes:
         load the state and the per-lane inputs; per-lane work
         for each step:
-            load the step's inputs; the step's work; store the outputs of this step
+            load the step's inputs; the step's work; store the outputs of this step, and sums
         store the state and the outputs of the last step
 
 State is always blocked, [block, number, 8]. Other per-lane data are either blocked too,
 [block, step, number, 8], or plain rows, [lane, step, number], which the kernel gathers and
-scatters itself: packing rows in NumPy would cost more than the filter does.
+scatters itself: packing rows in NumPy would cost more than the filter does. What is summed over
+lanes is [chunk, step, number] in both.
 
 Floating-point flag `contract` only: multiply and add may fuse, NaN and infinity stay legal, and
 every lane sees the same operations, so one lane and a million give the same bits.
 """
 
+from boresight.lanes.outputs import output_base, write_outputs
+from boresight.lanes.places import BLOCK, address, lane_base, step_base
 from boresight.lanes.program import Program, Rate, Slot
 from boresight.lanes.writer import Shape, Writer
-
-BLOCK = 8  # lanes of one block in memory, whatever the processor
 
 
 def _scalar_loads(w: Writer, slot: Slot, argument: str, base: str) -> None:
@@ -32,85 +33,15 @@ def _scalar_loads(w: Writer, slot: Slot, argument: str, base: str) -> None:
         w.line(f"  %n{node} = load double, ptr {pointer}, align 8")
 
 
-def _address(w: Writer, argument: str, base: str, element: int) -> str:
-    """Pointer (blocked) or pointers (rows) of one number of the W lanes."""
-    if not w.shape.rows:
-        index = w.emit(f"add i64 {base}, {element * BLOCK}")
-        return w.emit(f"getelementptr double, ptr {argument}, i64 {index}")
-    width = w.shape.width
-    return w.emit(f"getelementptr double, <{width} x ptr> {base}, i64 {element}")
-
-
 def _load(w: Writer, argument: str, base: str, element: int) -> str:
-    address, kind = _address(w, argument, base, element), w.vector
+    place, kind = address(w, argument, base, element), w.vector
     if not w.shape.rows:
-        return f"load {kind.number}, ptr {address}, align 8"
+        return f"load {kind.number}, ptr {place}, align 8"
     width = w.shape.width
     return (
         f"call {kind.number} @llvm.masked.gather.{kind.suffix}f64.{kind.suffix}p0(<{width} x ptr> "
-        f"{address}, i32 8, {kind.bit} splat (i1 true), {kind.number} poison)"
+        f"{place}, i32 8, {kind.bit} splat (i1 true), {kind.number} poison)"
     )
-
-
-def _store(w: Writer, argument: str, base: str, element: int, value: str) -> None:
-    address, kind = _address(w, argument, base, element), w.vector
-    if not w.shape.rows:
-        w.line(f"  store {kind.number} {value}, ptr {address}, align 8")
-        return
-    width = w.shape.width
-    w.line(
-        f"  call void @llvm.masked.scatter.{kind.suffix}f64.{kind.suffix}p0({kind.number} {value}, "
-        f"<{width} x ptr> {address}, i32 8, {kind.bit} splat (i1 true))"
-    )
-
-
-def _store_turned(w: Writer, bases: str, element: int, values: list[str]) -> None:
-    """Several numbers of W lanes, turned so that each lane's lie side by side: a store a lane.
-
-    A scatter of every number costs twice as much.
-    """
-    width, kind, some = w.shape.width, w.vector.number, len(values)
-    rows = [*values, *["poison"] * (width - some)]
-    distance = 1
-    while distance < width:
-        for i in (i for i in range(width) if not i & distance):
-            pair = f"{kind} {rows[i]}, {kind} {rows[i + distance]}"
-            low = [p + width - distance if p & distance else p for p in range(width)]
-            high = [p + width if p & distance else p + distance for p in range(width)]
-            rows[i], rows[i + distance] = (_shuffle(w, pair, mask) for mask in (low, high))
-        distance *= 2
-    for lane, row in enumerate(rows):
-        start = w.emit(f"extractelement <{width} x ptr> {bases}, i64 {lane}")
-        place = w.emit(f"getelementptr double, ptr {start}, i64 {element}")
-        part = row
-        if some < width:
-            part = _shuffle(w, f"{kind} {row}, {kind} poison", list(range(some)))
-        w.line(f"  store <{some} x double> {part}, ptr {place}, align 8")
-
-
-def _shuffle(w: Writer, pair: str, mask: list[int]) -> str:
-    places = ", ".join(f"i32 {p}" for p in mask)
-    return w.emit(f"shufflevector {pair}, <{len(mask)} x i32> <{places}>")
-
-
-def _lane_base(w: Writer, argument: str, size: int, steps: str) -> str:
-    """Where the data of this chunk's lanes begin in an argument of `size` numbers a step."""
-    numbers = w.emit(f"mul i64 {steps}, {size}")
-    if not w.shape.rows:
-        start = w.emit(f"mul i64 %block, {numbers}")
-        scaled = w.emit(f"mul i64 {start}, {BLOCK}")
-        return w.emit(f"add i64 {scaled}, %inside")
-    offsets = w.emit(f"mul {w.vector.integer} %lane, {w.splat(numbers, 'i64')}")
-    return w.emit(f"getelementptr double, ptr {argument}, {w.vector.integer} {offsets}")
-
-
-def _step_base(w: Writer, base: str, size: int) -> str:
-    """`base` moved to step %t."""
-    if not w.shape.rows:
-        moved = w.emit(f"mul i64 %t, {size * BLOCK}")
-        return w.emit(f"add i64 {base}, {moved}")
-    moved = w.emit(f"mul i64 %t, {size}")
-    return w.emit(f"getelementptr double, <{w.shape.width} x ptr> {base}, i64 {moved}")
 
 
 def _state_offset(program: Program, name: str) -> int:
@@ -181,15 +112,14 @@ def write_ir(program: Program, shape: Shape, name: str, attributes: str) -> str:
     _chunk_places(w)
     old, lane_bases = _write_lane_part(w, slots)
     out_bases = [
-        _lane_base(w, r, s.leaf.size, "%steps" if s.rate == Rate.EACH else "1")
-        for s, r in zip(program.outputs, results, strict=True)
+        output_base(w, slot, result) for slot, result in zip(program.outputs, results, strict=True)
     ]
     w.line("  br label %step\nstep:\n  %t = phi i64 [ 0, %chunks ], [ %nextt, %step ]")
     _write_step(w, slots, old, lane_bases)
-    _write_outputs(w, results, out_bases, Rate.EACH)
+    write_outputs(w, results, out_bases, (Rate.EACH, Rate.STEP))
     w.line("  %nextt = add i64 %t, 1\n  %more = icmp ult i64 %nextt, %steps")
     w.line("  br i1 %more, label %step, label %done\ndone:")
-    _write_outputs(w, results, out_bases, Rate.LANE)
+    write_outputs(w, results, out_bases, (Rate.LANE,))
     base = _state_base(w)
     for k, node in enumerate(program.state_nodes):
         value = w.value(node, w.vector)
@@ -227,11 +157,11 @@ def _write_lane_part(
     bases = {}
     for slot, argument in slots:
         if slot.rate == Rate.LANE:
-            start = _lane_base(w, argument, slot.leaf.size, "1")
+            start = lane_base(w, argument, slot.leaf.size, "1")
             for k, node in w.elements.get(slot.name, ()):
                 w.line(f"  %n{node} = {_load(w, argument, start, k)}")
         elif slot.rate == Rate.EACH:
-            bases[slot.name] = _lane_base(w, argument, slot.leaf.size, "%steps")
+            bases[slot.name] = lane_base(w, argument, slot.leaf.size, "%steps")
     w.compute(Rate.LANE)
     return old, bases
 
@@ -247,7 +177,7 @@ def _write_step(
     _precompute_splats(w, Rate.STEP)
     for slot, argument in slots:
         if slot.rate == Rate.EACH:
-            base = _step_base(w, bases[slot.name], slot.leaf.size)
+            base = step_base(w, bases[slot.name], slot.leaf.size)
             for k, node in w.elements.get(slot.name, ()):
                 w.line(f"  %n{node} = {_load(w, argument, base, k)}")
     w.compute(Rate.EACH)
@@ -264,21 +194,3 @@ def _carried(w: Writer, old: dict[int, str]) -> list[str]:
             lines.append(f"  %n{node} = phi {w.vector.number} {sources}")
         element += slot.leaf.size
     return lines
-
-
-def _write_outputs(w: Writer, results: list[str], bases: list[str], rate: Rate) -> None:
-    for slot, numbers, argument, base in zip(
-        w.program.outputs, w.program.output_nodes, results, bases, strict=True
-    ):
-        if slot.rate != rate:
-            continue
-        place = _step_base(w, base, slot.leaf.size) if rate == Rate.EACH else base
-        values = [w.value(node, w.vector) for node in numbers]
-        k, count = 0, len(values)
-        while k < count:  # the largest power of two that is left, but no more than the lanes
-            some = min(w.shape.width, 1 << (count - k).bit_length() - 1) if w.shape.rows else 1
-            if some == 1:
-                _store(w, argument, place, k, values[k])
-            else:
-                _store_turned(w, place, k, values[k : k + some])
-            k += some

@@ -113,7 +113,11 @@ def Symmetric(n: int) -> Leaf:
 
 @dataclass(frozen=True)
 class Slot:
-    """A named leaf of the program with its rate; an output of rate LANE keeps the last step's."""
+    """A named leaf of the program with its rate.
+
+    An output of rate EACH is written at every step, one of rate LANE after the last, and of one of
+    rate STEP the sum over the 8 lanes of a block, at every step.
+    """
 
     name: str
     leaf: Leaf
@@ -129,7 +133,7 @@ class Program:
         rates: how often each node must be computed.
         inputs: declared inputs.
         state: what travels from step to step, per lane.
-        outputs: what is written, each step (rate EACH) or after the last (rate LANE).
+        outputs: what is written: at every step, after the last, or summed over lanes (`Slot`).
         state_nodes: nodes of the new state, in the order of the flattened state.
         output_nodes: nodes of each output.
     """

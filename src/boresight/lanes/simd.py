@@ -20,7 +20,8 @@ from typing import Any
 
 from boresight.errors import UsageError
 from boresight.lanes.elementary import lower
-from boresight.lanes.ir import BLOCK, write_ir
+from boresight.lanes.ir import write_ir
+from boresight.lanes.places import BLOCK
 from boresight.lanes.program import Program
 from boresight.lanes.writer import Shape
 
