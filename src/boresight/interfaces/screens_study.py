@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from boresight.laboratory.result import Cell, StudyResult
 
-WIDE = 110
+WIDE = 100
 STYLES = {"consistent": "green", "too sure": "red", "too modest": "yellow", "no number": "red"}
 DETAILED = 4  # settings whose verdicts are printed in full; the report has them all
 
@@ -42,24 +42,23 @@ def _ranking(result: "StudyResult", setting: int, width: int) -> "RenderableType
     cells = cells_of(result, setting)
     percent = f"{100 * (1 - result.study.false_alarm):g} %"
     wide = width >= WIDE
-    more = ["interval", "median run"] if wide else ["median"]
-    heads = ["filter", "position", *more, "× bound", "velocity", "ANEES", f"{percent} band", ""]
-    grid = table(setting_name(cells[0].values), *heads, *["diverged", "ns/step"])
+    before = ["position", "interval", "median"] if wide else ["position", "median"]
+    heads = ["filter", *before, "× bound", *(["velocity"] if wide else []), "ANEES"]
+    grid = table(
+        setting_name(cells[0].values), *heads, f"{percent} band", "", "diverged", "ns/step"
+    )
+    grid.title = grid.title or None
     for cell in cells:
         low, high = cell.anees_bounds
         words = consistency(cell)
-        optional = [ends(cell.position_rmse_m)] if wide else []
+        position = [rmse(cell.position_rmse_m, "m"), figure(cell.median_rmse_m, 3)]
         grid.add_row(
             cell.label,
-            rmse(cell.position_rmse_m, "m"),
-            *optional,
-            f"{figure(cell.median_rmse_m, 3)} m",
+            *([position[0], ends(cell.position_rmse_m), position[1]] if wide else position),
             figure(cell.ratio_to_bound, 3),
-            rmse(cell.velocity_rmse_mps, "m/s")
-            if wide
-            else figure(cell.velocity_rmse_mps.value, 3),
+            *([rmse(cell.velocity_rmse_mps, "m/s")] if wide else []),
             figure(cell.anees.value, 3),
-            f"{low:.3f} – {high:.3f}",
+            f"{low:.3f}–{high:.3f}",
             text(words, STYLES[words]),
             _share(cell),
             figure(cell.ns_per_step, 3),

@@ -1,6 +1,6 @@
 """A study's numbers as Polars frames: a row for each cell, each run, or each scan."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,9 +83,7 @@ def runs_frame(result: StudyResult) -> "pl.DataFrame":
     import polars as pl
 
     parts = [
-        pl.DataFrame(
-            {**_names(cell), "run": np.arange(cell.runs), **_columns(cell.per_run, cell.runs)}
-        )
+        pl.DataFrame({**_names(cell), "run": np.arange(cell.runs), **_columns(cell.per_run, ())})
         for cell in result.cells
     ]
     return pl.concat(parts, how="diagonal_relaxed")
@@ -97,9 +95,9 @@ def scans_frame(result: StudyResult) -> "pl.DataFrame":
 
     parts = []
     for cell in result.cells:
-        time_s = result.study.settings[cell.setting].scenario.time_s
-        columns = _columns(cell.per_scan, len(time_s))
-        parts.append(pl.DataFrame({**_names(cell), "time_s": time_s, **columns}))
+        scenario = result.study.settings[cell.setting].scenario
+        columns = _columns(cell.per_scan, scenario.motion.names)
+        parts.append(pl.DataFrame({**_names(cell), "time_s": scenario.time_s, **columns}))
     return pl.concat(parts, how="diagonal_relaxed")
 
 
@@ -107,15 +105,24 @@ def _names(cell: Cell) -> dict[str, Any]:
     return {**dict(cell.values), "label": cell.label}
 
 
-def _columns(arrays: Mapping[str, Any], rows: int) -> dict[str, Any]:
+# What is kept squared, so that it can be averaged, is told as its root.
+_ROOTS = {
+    "position_sq_m2": "position_rmse_m",
+    "velocity_sq_m2ps2": "velocity_rmse_mps",
+    "claimed_m2": "claimed_m",
+    "bound_m2": "bound_m",
+}
+
+
+def _columns(arrays: Mapping[str, Any], states: Sequence[str]) -> dict[str, Any]:
+    """Columns of numbers; a vector of the state has a column for each element."""
     found: dict[str, Any] = {}
     for name, array in arrays.items():
-        values = np.asarray(array)
-        if len(values) != rows:
-            continue
-        if values.ndim == 1:
+        values = np.asarray(array, dtype=float)
+        if name in _ROOTS:
+            found[_ROOTS[name]] = np.sqrt(values)
+        elif values.ndim == 1:
             found[name] = values
-        else:
-            flat = values.reshape(rows, -1)
-            found |= {f"{name}_{i}": flat[:, i] for i in range(flat.shape[1])}
+        elif values.ndim == 2 and values.shape[1] == len(states):
+            found |= {f"{name}_{state}": values[:, i] for i, state in enumerate(states)}
     return found

@@ -30,7 +30,17 @@ def _setting(result: StudyResult, setting: int) -> str:
     cells = [cell for cell in result.cells if cell.setting == setting]
     name = ", ".join(f"{key} {value}" for key, value in cells[0].values)
     rows = "".join(_row(cell, COLORS[i % len(COLORS)]) for i, cell in enumerate(cells))
-    heads = ("", "filter", "position RMSE, m", "× bound", "ANEES", "band", "diverged", "ns/step")
+    heads = (
+        "",
+        "filter",
+        "position RMSE, m",
+        "median run",
+        "× bound",
+        "ANEES",
+        "band",
+        "diverged",
+        "ns/step",
+    )
     head = "".join(f"<th>{each}</th>" for each in heads)
     words = "".join(f"<li>{escape(w)}</li>" for cell in cells for w in cell.verdicts)
     time = result.study.settings[setting].scenario.time_s
@@ -46,6 +56,7 @@ def _row(cell: Cell, color: str) -> str:
     inside = low <= cell.anees.value <= high
     figures = (
         f"{position.value:.4g} ({position.low:.4g} to {position.high:.4g})",
+        f"{cell.median_rmse_m:.4g}",
         f"{cell.ratio_to_bound:.3f}" if np.isfinite(cell.ratio_to_bound) else "–",
         f"{'' if inside else '<b>'}{cell.anees.value:.3g}{'' if inside else '</b>'}",
         f"{low:.3f} to {high:.3f}",
