@@ -44,9 +44,7 @@ def _ranking(result: "StudyResult", setting: int, width: int) -> "RenderableType
     wide = width >= WIDE
     before = ["position", "interval", "median"] if wide else ["position", "median"]
     heads = ["filter", *before, "× bound", *(["velocity"] if wide else []), "ANEES"]
-    grid = table(
-        setting_name(cells[0].values), *heads, f"{percent} band", "", "diverged", "ns/step"
-    )
+    grid = table(setting_name(cells[0].values), *heads, f"{percent} band", "", "lost", "ns")
     grid.title = grid.title or None
     for cell in cells:
         low, high = cell.anees_bounds
