@@ -54,7 +54,7 @@ def normals(
     Raises:
         UsageError: a seed or a number of runs that is out of range.
     """
-    _check(seed, runs, first)
+    check(seed, runs, first)
     steps, count = (shape[0], math.prod(shape[1:])) if len(shape) > 1 else (1, math.prod(shape))
     step, pair = np.indices((steps, (count + 1) // 2)).reshape(2, -1)  # a kernel's step is a pair
     kernel = _kernel()
@@ -92,12 +92,13 @@ def generator(seed: int, cell: str, stream: Stream, run: int) -> np.random.Gener
 
     NumPy's own Philox, of 64-bit words, under a key of its own: not the numbers of `normals`.
     """
-    _check(seed, 1, run)
+    check(seed, 1, run)
     key = np.array([seed, _hash(cell)], dtype=np.uint64)
     return np.random.Generator(np.random.Philox(counter=[0, 0, run, stream], key=key))
 
 
-def _check(seed: int, runs: int, first: int) -> None:
+def check(seed: int, runs: int, first: int) -> None:
+    """UsageError where a seed, a number of runs or the first one's number is out of range."""
     for name, value in (("seed", seed), ("runs", runs), ("first", first)):
         if not isinstance(value, int | np.integer):
             raise UsageError(f"{name}={value!r} is not a whole number")
