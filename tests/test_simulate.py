@@ -8,9 +8,11 @@ import pytest
 from boresight.errors import UsageError
 from boresight.experiments.montecarlo import filtered, run_cell
 from boresight.experiments.scenario import FOOT_M, lookup, paper, scenario_names
-from boresight.experiments.simulate import root_of, simulate
+from boresight.experiments.simulate import simulate
+from boresight.experiments.world import root_of
 from boresight.filters.formula import Formula
 from boresight.lanes import Scalar
+from boresight.maths import random, wrap
 from boresight.maths.seeds import Stream, normals
 from boresight.models.coordinates import PositionSensor
 from boresight.models.motion import ConstantVelocity, Static
@@ -58,22 +60,16 @@ def test_aditya_repeats_too():
     assert np.array_equal(few[1].z[7], many[1].z[7])
 
 
-def test_normals_are_philox_at_the_counter_of_the_run():
-    rows = normals(5, "cell", Stream.NOISE, (4, 3), runs=3)
-    key = np.random.Philox(key=np.array([5, _key_of("cell")], dtype=np.uint64)).state["state"][
-        "key"
-    ]
-    for i, row in enumerate(rows):
-        bits = np.random.Philox(
-            key=key, counter=np.array([0, 0, i, Stream.NOISE.value], dtype=np.uint64)
-        )
-        assert np.array_equal(row, np.random.Generator(bits).standard_normal((4, 3)))
-
-
-def _key_of(name):
-    import hashlib
-
-    return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")
+def test_plots_are_made_of_the_numbers_of_their_run_scan_and_stream():
+    """Range and azimuth of the true place, and the noise that formulas draw for them."""
+    world = lookup("kashyap-set-2")
+    truth, plots = simulate(world, runs=3, seed=5)
+    scans = np.arange(world.scans)
+    drawn = random.normals(random.key(5, world.name), np.arange(3)[:, None], scans, Stream.NOISE, 2)
+    for i, part in enumerate(world.sensor.components(world.motion)):
+        value = np.apply_along_axis(part.value, -1, truth.states) + part.sigma * drawn[i]
+        off = plots.z[..., i] - value
+        np.testing.assert_allclose(wrap(off) if part.is_angle else off, 0.0, atol=1e-11)
 
 
 def test_streams_cells_seeds_and_runs_are_independent():

@@ -33,6 +33,8 @@ class Stream(IntEnum):
     START = 2
     ORIGIN = 3
     PARTICLES = 4
+    DETECTION = 5
+    FALSE_PLOTS = 6
 
 
 def normals(
@@ -55,6 +57,8 @@ def normals(
         UsageError: a seed or a number of runs that is out of range.
     """
     check(seed, runs, first)
+    if 0 in shape:
+        return np.zeros((runs, *shape))
     steps, count = (shape[0], math.prod(shape[1:])) if len(shape) > 1 else (1, math.prod(shape))
     step, pair = np.indices((steps, (count + 1) // 2)).reshape(2, -1)  # a kernel's step is a pair
     kernel = _kernel()
