@@ -1,27 +1,26 @@
-"""Truth and plots of many runs: the filters' own formulas, run forward with drawn noise.
+"""Truth and plots of many runs: a world's formula, run over all of them at once.
 
-A step of the world is recorded once and run over all runs at once, as filters are. What is random
-comes from `maths.seeds`: the truth, the plots' noise and the start of a filter each have a stream
-of their own, so run 7 is the same run whatever the number of runs.
+What is random is a function of the seed, the scenario's name, the run and what it is for (see
+`maths.random`): the truth, the plots' noise, detection, false plots and the start of a filter each
+have a stream of their own, so run 7 is the same run whatever the number of runs.
 """
 
-from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from boresight.errors import UsageError
 from boresight.experiments.scenario import Scenario, lookup
-from boresight.filters.formula import Formula
+from boresight.experiments.world import World, root_of
 from boresight.filters.start import on_bearing, one_plot, two_plots
-from boresight.lanes import Matrix, Rate, Scalar, Vector
-from boresight.maths import Gaussian, wrap
-from boresight.maths.seeds import Stream, normals
+from boresight.lanes import Kernel, Leaf, Matrix, Rate, Vector, make_kernel, pack_states, trace
+from boresight.maths import Gaussian
+from boresight.maths.seeds import Stream, check, normals
 from boresight.models.motion import Motion
 from boresight.models.sensors import Radar, Sensor
 
 Array = Any
-_SINGULAR = 1e-12  # of a variance: less is rounding left over from the noise's other directions
 
 
 class Truth(NamedTuple):
@@ -45,15 +44,19 @@ class Plots(NamedTuple):
 
     Attributes:
         time_s: (scans,).
-        z: (runs, scans, k), in the order of the sensor's `names`, angles in radians.
+        z: (runs, scans, k), in the order of the sensor's `names`, angles in radians; NaN where the
+            target was not seen, or its plot was used for the start.
         dt: (1, scans), s before each scan.
         prior: mean (runs, n), cov (n, n) or (runs, n, n), before the first plot.
+        candidates: (runs, scans, m, k), all plots of each scan in no order, the target's among
+            them, NaN where there is none; None where there are no false plots.
     """
 
     time_s: Array
     z: Array
     dt: Array
     prior: Gaussian
+    candidates: Array | None = None
 
 
 def simulate(
@@ -63,6 +66,8 @@ def simulate(
     runs: int,
     seed: int,
     first: int = 0,
+    truth_run: int | None = None,
+    noise_run: int | None = None,
 ) -> tuple[Truth, Plots]:
     """Truth and plots of many runs of a scenario.
 
@@ -73,123 +78,104 @@ def simulate(
         runs: number of runs.
         seed: run i of a seed is the same whatever `runs` is.
         first: number of the first run.
+        truth_run: number of the run whose truth all have; None: each has its own.
+        noise_run: number of the run whose plots' noise, detection, false plots and start all have;
+            None: each has its own.
 
     Returns:
         The truth and the plots; `bs.run` takes the plots as they are.
 
     Raises:
-        UsageError: an unknown scenario, or a seed or number of runs out of range.
+        UsageError: an unknown scenario, a seed or number of runs out of range, a bias of what the
+            sensor does not measure, too many false plots.
     """
-    world = scenario if isinstance(scenario, Scenario) else lookup(scenario)
-    eye = world.sensor if sensor is None else sensor
-    root = _roots(world)
-    n, k = len(world.motion.names), len(eye.names)
+    scene = scenario if isinstance(scenario, Scenario) else lookup(scenario)
+    world = World(scene, scene.sensor if sensor is None else sensor)
+    moving, noisy = ((first, runs) if one is None else (one, 1) for one in (truth_run, noise_run))
+    for start, count in ((first, runs), moving, noisy):
+        check(seed, count, start)
 
-    def draw(stream: Stream, *shape: int) -> Array:
-        return normals(seed, world.name, stream, shape, runs=runs, first=first)
+    def of(part: tuple[int, int]) -> Array:
+        return np.broadcast_to(part[0] + np.arange(part[1], dtype=float), runs)
 
-    inputs = {"root": root, "pushes": draw(Stream.TRUTH, world.scans, root.shape[2])}
-    inputs |= {"dt": world.dt[0], "noise": draw(Stream.NOISE, world.scans, k)}
-    start = np.broadcast_to(world.initial, (runs, n))
-    if world.draw:
-        start = world.draw(draw(Stream.ORIGIN, n))
-    states, z = _run(world.motion, eye, start, inputs)
-    truth = Truth(world.time_s, states, world.motion.names, start)
-    return truth, _plots(world, eye, z, draw(Stream.START, n))
-
-
-def _plots(world: Scenario, sensor: Sensor, z: Array, normal: Array) -> Plots:
-    """The plots, with the start that the scenario asks for."""
-    dt = world.dt
-    if world.begin == "given":
-        prior = world.prior
-    elif world.begin == "random draw":
-        prior = Gaussian(world.initial + normal @ root_of(world.prior_cov).T, world.prior_cov)
-    elif world.begin == "one plot":
-        prior = one_plot(z[:, 0], world.motion, sensor, speed_mps=world.speed_mps)
-        z, dt = _spent(z, dt, 1)
-    elif world.begin == "on bearing":
-        prior = _on_bearing(world, sensor, z[:, 0])
-        z, dt = _spent(z, dt, 1)
-    else:
-        prior = two_plots(z[:, 0], z[:, 1], dt[0, 1], world.motion, sensor)
-        z, dt = _spent(z, dt, 2)
-    return Plots(world.time_s, z, dt, prior)
+    origin = np.broadcast_to(world.origins(seed, *moving), (runs, len(scene.motion.names)))
+    kernel, values = _kernel(world), world.values(seed, of(moving), of(noisy))
+    _, out = kernel.run(pack_states(kernel.program.state, {"truth": origin}), values, scene.scans)
+    truth = Truth(scene.time_s, out["truth"], scene.motion.names, origin)
+    begun = begin(scene, scene.motion, world.sensor, out["z"], starts(scene, seed, noisy, runs))
+    return truth, _plots(scene, out["z"], out.get("candidates"), begun)
 
 
-def _on_bearing(world: Scenario, sensor: Sensor, z: Array) -> Gaussian:
-    if not (isinstance(sensor, Radar) and {"azimuth_rad", "cone_rad"} & set(sensor.names)):
-        raise UsageError(
-            f"scenario {world.name!r} starts on a bearing, which {', '.join(sensor.names)} is not",
-            next_step="use bs.Bearings(azimuth_deg=..., pose=...)",
-        )
-    known = (world.range_m, world.range_sd_m)
-    return on_bearing(z, world.motion, sensor, *known, speed_mps=world.speed_mps)
+def starts(scenario: Scenario, seed: int, part: tuple[int, int], runs: int) -> Array:
+    """(runs, n) standard normals of filters' starts: of runs (first, count), or one for all."""
+    n = len(scenario.motion.names)
+    drawn = normals(seed, scenario.name, Stream.START, (n,), first=part[0], runs=part[1])
+    return np.broadcast_to(drawn, (runs, n))
 
 
-def _spent(z: Array, dt: Array, plots: int) -> tuple[Array, Array]:
-    """Plots that made the start are missing afterwards, and no time passes before the next."""
-    z[:, :plots] = np.nan
-    dt[0, :plots] = 0.0
-    return z, dt
-
-
-def root_of(cov: Array) -> Array:
-    """A factor B (n, rank) with B B' = cov: Cholesky's, without its empty columns.
-
-    For a singular G Q G' it is G itself times the noise's standard deviation: what is drawn is the
-    acceleration, and the truth never leaves the directions in which noise can push it.
+def begin(scenario: Scenario, motion: Motion, sensor: Sensor, z: Array, normal: Array) -> Gaussian:
+    """Where filters begin, as the scenario asks for.
 
     Args:
-        cov: (n, n), symmetric, positive semidefinite.
+        scenario: says how.
+        motion: how filters believe that targets move.
+        sensor: what they believe of the sensor.
+        z: (runs, scans, k) the target's own plots; the first `scenario.spent` are looked at.
+        normal: (runs, n) standard normals, for a random draw.
+
+    Returns:
+        mean (n,) or (runs, n), cov (n, n) or (runs, n, n).
     """
-    rest, columns = np.array(cov, dtype=float), []
-    for j in range(len(rest)):
-        if rest[j, j] > _SINGULAR * cov[j, j]:
-            column = rest[:, j] / np.sqrt(rest[j, j])
-            columns.append(column)
-            rest = rest - np.outer(column, column)
-    return np.stack(columns or [np.zeros(len(rest))], axis=1)  # no noise: a column of zeros
+    how, first = scenario.begin, z[:, : scenario.spent]
+    if how == "given":
+        return scenario.prior
+    if how == "random draw":
+        root = root_of(scenario.prior_cov)
+        offset = normal[:, : root.shape[1]] @ root.T
+        return Gaussian(scenario.initial + offset, scenario.prior_cov)
+    if how == "one plot":
+        return one_plot(first[:, 0], motion, sensor, speed_mps=scenario.speed_mps)
+    if how == "two plots":
+        return two_plots(first[:, 0], first[:, 1], scenario.dt[0, 1], motion, sensor)
+    return _on_bearing(scenario, motion, sensor, first[:, 0])
 
 
-def _roots(world: Scenario) -> Array:
-    """(scans, n, rank): the factor of the process noise before each scan."""
-    root = root_of(world.motion.noise(world.dt_s))
-    return np.where(world.time_s[:, None, None] > 0.0, root, 0.0)
-
-
-def _run(
-    motion: Motion, sensor: Sensor, start: Array, inputs: Mapping[str, Array]
-) -> tuple[Array, Array]:
-    """States (runs, scans, n) and plots (runs, scans, k)."""
-    (scans, n, rank), k = inputs["root"].shape, len(sensor.names)
-    formula = Formula(
-        step=_step,
-        motion=motion,
-        sensor=sensor,
-        state=(("state", Vector(n)),),
-        inputs=(
-            ("dt", Scalar(), Rate.STEP),
-            ("root", Matrix(n, rank), Rate.STEP),
-            ("pushes", Vector(rank), Rate.EACH),
-            ("noise", Vector(k), Rate.EACH),
-        ),
-        outputs=(("state", Vector(n)), ("z", Vector(k))),
-    )
-    outputs = formula.run({"state": start}, inputs, scans)
-    return outputs["state"], outputs["z"]
-
-
-def _step(
-    motion: Motion, sensor: Sensor, state: Mapping[str, Any], inputs: Mapping[str, Any]
-) -> tuple[Any, Any]:
-    """The target moves and is seen."""
-    moved = motion.move(state["state"], inputs["dt"]) + inputs["root"] @ inputs["pushes"]
-    seen = [
-        (c, c.value(moved) + c.sigma * noise)
-        for c, noise in zip(
-            sensor.components(motion), sensor.coloured(inputs["noise"]), strict=True
+def _on_bearing(scenario: Scenario, motion: Motion, sensor: Sensor, z: Array) -> Gaussian:
+    if not (isinstance(sensor, Radar) and {"azimuth_rad", "cone_rad"} & set(sensor.names)):
+        raise UsageError(
+            f"scenario {scenario.name!r} starts on a bearing, which {', '.join(sensor.names)} is "
+            "not",
+            next_step="use bs.Bearings(azimuth_deg=..., pose=...)",
         )
-    ]
-    z = np.array([wrap(value) if c.is_angle else value for c, value in seen])
-    return {"state": moved}, {"state": moved, "z": z}
+    known = (scenario.range_m, scenario.range_sd_m)
+    return on_bearing(z, motion, sensor, *known, speed_mps=scenario.speed_mps)
+
+
+def _plots(scenario: Scenario, z: Array, candidates: Array | None, prior: Gaussian) -> Plots:
+    """Plots that made the start are missing afterwards, and no time passes before the next."""
+    dt, spent = scenario.dt, scenario.spent
+    for each in (z,) if candidates is None else (z, candidates):
+        each[:, :spent] = np.nan
+    dt[0, :spent] = 0.0
+    return Plots(scenario.time_s, z, dt, prior, candidates)
+
+
+@lru_cache(maxsize=64)
+def _kernel(world: World) -> Kernel:
+    """The world by itself, all that happens in it written down."""
+    k, many = len(world.sensor.names), world.candidates
+    leaves: dict[str, Leaf] = {"truth": world.state["truth"], "z": Vector(k)}
+    leaves |= {"candidates": Matrix(many, k)} if many else {}
+
+    def step(state: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
+        new, scene = world.step(state, inputs)
+        return new, scene._asdict()
+
+    return make_kernel(
+        trace(
+            step,
+            state=world.state,
+            inputs=world.inputs,
+            outputs={name: (leaf, Rate.EACH) for name, leaf in leaves.items()},
+        )
+    )
