@@ -69,7 +69,9 @@ def test_p1_the_packages_scenario():
 
 
 def test_p1_in_knots_own_ship_cannot_be_where_it_would_have_to_be():
-    there = 3705.24 * paper.heading(np.radians(66.49))
+    printed = scenario.paper("pradeep")["tables"]["PR-T1"]
+    bearing = np.radians(printed["true_bearing_deg"])
+    there = printed["true_range_m"] * paper.heading(bearing)
     needed = np.linalg.norm(paper.target(paper.TARGET * KNOT)[150] - there)
     assert needed > 150 * paper.OWN_SHIP * KNOT + 80.0
     needed = np.linalg.norm(paper.target(paper.TARGET)[150] - there)

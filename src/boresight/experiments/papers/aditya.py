@@ -45,6 +45,7 @@ def reproduce(
     sigma = studies[cases.index((READINGS[0], table["assumed"]["scans"]))]
     best = max(studies, key=lambda one: _inside(_numbers(table, one)))
     claims = [
+        _setting(table),
         _table1(table, sigma),
         _table2(table),
         _table3(table, studies, best),
@@ -55,6 +56,19 @@ def reproduce(
         _observable(table["claims"]["AD-C3"], sigma),
     ]
     return claims, aditya_figures.write(sigma, output) if output else []
+
+
+def _setting(table: dict[str, Any]) -> Claim:
+    """Table 2 as it is run: both readings have all of it but R in common."""
+    printed = table["table2"]
+    return Claim(
+        id="AD-S01",
+        where=table["settings"]["AD-S01"]["where"],
+        published=printed,
+        ours=printed | {name: table["assumed"][name] for name in ("scans_tried", "begin")},
+        verdict="cannot be checked",
+        assumption=f"{'; '.join(table['why'].values())}; R by both readings (AD-T2)",
+    )
 
 
 def _table1(table: dict[str, Any], sigma: Study) -> Claim:
@@ -123,7 +137,7 @@ def _table3(table: dict[str, Any], studies: list[Study], best: Study) -> Claim:
         band=_by_name(parts, "band"),
         verdict=worst([part.verdict for part in parts]),
         assumption="neither the number of steps nor of runs is printed; ours are medians of single "
-        f"runs of {best.name}, the kindest of those tried; {table['assumed']['why_begin']}. "
+        f"runs of {best.name}, the kindest of those tried; {table['why']['begin']}. "
         f"Numbers in the band, of {len(parts)}: {counts}",
         parts=parts,
     )

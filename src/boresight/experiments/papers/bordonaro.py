@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from boresight.experiments.papers import (
+    bordonaro_bounds,
     bordonaro_claims,
     bordonaro_figures,
     bordonaro_metrics,
@@ -49,6 +50,7 @@ def reproduce(
     claims = [
         *bordonaro_metrics.settings(study),
         *shown.values(),
+        bordonaro_bounds.bounds(study),
         *bordonaro_metrics.metrics(study),
         *bordonaro_claims.claims(study, shown),
         *bordonaro_claims.future(study),

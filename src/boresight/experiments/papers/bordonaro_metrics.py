@@ -40,14 +40,14 @@ def _setting(study: Study, name: str) -> Claim:
     if study.asked:
         ours |= {key: study.asked for key in ("runs", "samples") if key in printed}
     open_or_less = left or ours != printed
+    asked = "printed in full, and run so but for the number of runs, which was asked for"
     return Claim(
         id=name,
         where=where,
         published=printed,
         ours=ours,
         verdict="cannot be checked" if open_or_less else "reproduces",
-        assumption=reasons(study, *left)
-        or ("fewer runs were asked for" if open_or_less else "printed in full, and run so"),
+        assumption=reasons(study, *left) or (asked if open_or_less else "printed in full, run so"),
     )
 
 

@@ -29,7 +29,7 @@ def reproduce(
     if output:
         figures.require()
     study = Study(table, runs, seed)
-    found = [
+    claims = [
         *kashyap_settings.settings(study),
         *kashyap_tables.tables(study),
         *kashyap_diagrams.diagrams(study),
@@ -37,10 +37,4 @@ def reproduce(
         *kashyap_settings.metrics(study),
         *kashyap_claims.claims(study),
     ]
-    claims = sorted(found, key=lambda claim: _place(claim.id))
     return claims, kashyap_figures.write(study, output) if output else []
-
-
-def _place(name: str) -> tuple[int, str]:
-    """Settings, tables, figures, metrics, claims; and KA-E1 last."""
-    return "STFXCE".index(name[3]), name

@@ -1,4 +1,4 @@
-"""pradeep's claims PR-C1 to PR-C6: what the range-parameterised bank is said to do."""
+"""pradeep's claims PR-C1 to PR-C7: what the range-parameterised bank is said to do."""
 
 from typing import Any
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from boresight.experiments.consistency import Bias, bias
 from boresight.experiments.papers.pradeep_compared import against_ekf, faster, lower_range_error
+from boresight.experiments.papers.pradeep_manoeuvres import other_manoeuvres
 from boresight.experiments.papers.pradeep_study import Study
 from boresight.experiments.papers.pradeep_words import (
     by_time,
@@ -30,7 +31,7 @@ Array = Any
 
 
 def claims(study: Study) -> list[Claim]:
-    """PR-C1 to PR-C6."""
+    """PR-C1 to PR-C7."""
     return [
         faster(study),
         lower_range_error(study),
@@ -38,6 +39,7 @@ def claims(study: Study) -> list[Claim]:
         _before_the_manoeuvre(study),
         _one_filter(study),
         against_ekf(study),
+        other_manoeuvres(study),
     ]
 
 
