@@ -61,11 +61,11 @@ def test_aditya_repeats_too():
 
 
 def test_plots_are_made_of_the_numbers_of_their_run_scan_and_stream():
-    """Range and azimuth of the true place, and the noise that formulas draw for them."""
+    """What is measured of the true place, and the noise that formulas draw for them."""
     world = lookup("kashyap-set-2")
     truth, plots = simulate(world, runs=3, seed=5)
     scans = np.arange(world.scans)
-    drawn = random.normals(random.key(5, world.name), np.arange(3)[:, None], scans, Stream.NOISE, 2)
+    drawn = random.normals(random.key(5, world.name), np.arange(3)[:, None], scans, Stream.NOISE, 3)
     for i, part in enumerate(world.sensor.components(world.motion)):
         value = np.apply_along_axis(part.value, -1, truth.states) + part.sigma * drawn[i]
         off = plots.z[..., i] - value
