@@ -7,12 +7,12 @@ noises and poses may be fixed, per lane, per step or both, and one kernel serves
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from boresight.errors import Status, UsageError
-from boresight.filters.steps import Method, judged
+from boresight.filters.steps import Guard, Method, judged
 from boresight.lanes import (
     Kernel,
     Leaf,
@@ -28,7 +28,6 @@ from boresight.lanes import (
 )
 from boresight.lanes.program import Slot
 from boresight.maths import Gaussian, elimination, select
-from boresight.models.components import Component
 from boresight.models.considered import own_states
 from boresight.models.motion import Motion
 from boresight.models.parameters import numbers, rate_of, structure, with_numbers
@@ -56,15 +55,6 @@ def leaves(n: int, k: int) -> dict[str, Leaf]:
     }
 
 
-class Guard(Protocol):
-    """Decides whether a plot can be the target's; a frozen dataclass of numbers."""
-
-    def admit(
-        self, prior: Gaussian, z: Array, components: Sequence[Component]
-    ) -> tuple[Array, Any]:
-        """The plot, NaN if it is turned away, and 1 if it was admitted, else 0."""
-
-
 def status_of(mean: Array, cov: Array) -> Any:
     """`Status` of a state: not finite, not positive definite, or well."""
     total = sum(abs(x) for x in mean) + sum(abs(cov[i, i]) for i in range(len(mean)))
@@ -90,12 +80,18 @@ class Recursion:
     method: Method
     motion: Motion
     sensor: Sensor
-    guard: "Guard | None" = None
+    guard: Guard | None = None
 
     @property
     def size(self) -> tuple[int, int]:
         """Number of states and of components."""
         return len(self.motion.names), len(self.sensor.names)
+
+    @property
+    def plot(self) -> Leaf:
+        """What comes at a step: a plot, or the candidates that the guard chooses from."""
+        k, many = len(self.sensor.names), getattr(self.guard, "candidates", None)
+        return Vector(k) if many is None else Matrix(many, k)
 
     @property
     def layout(self) -> dict[str, Leaf]:
@@ -192,7 +188,7 @@ def _kernel(
     recursion, rate = key.recursion, dict(rates)
     n, k = recursion.size
     known = leaves(n, k) | recursion.kept
-    shapes = {"z": Vector(k), "dt": Scalar()}
+    shapes = {"z": recursion.plot, "dt": Scalar()}
     shapes |= {name: leaf for name, (_, leaf) in recursion.models().items()}
     return make_kernel(
         trace(
@@ -275,7 +271,8 @@ def run_recursion(
 
     Args:
         recursion: what to run.
-        z: plots (lanes, steps, k), SI units and radians, NaN where missing.
+        z: plots (lanes, steps, k), SI units and radians, NaN where missing; (lanes, steps, m, k)
+            for a guard that chooses from m.
         dt: seconds before each step: a number, (1, steps), (lanes, 1) or (lanes, steps).
         start: Gaussian with mean (n,) or (lanes, n), or states of an earlier call.
         outputs: which of `OUTPUTS` to write; the rest is not computed. `kept_` and a name of the
@@ -283,11 +280,10 @@ def run_recursion(
         last: write outputs after the last step only.
         threads: how many threads share the lanes.
     """
-    z = np.asarray(z, dtype=float)
-    k = len(recursion.sensor.names)
-    if z.ndim != 3 or z.shape[2] != k:
+    z, plot = np.asarray(z, dtype=float), recursion.plot.shape
+    if z.shape[2:] != plot:
         raise UsageError(
-            f"plots have shape {z.shape}; (lanes, steps, {k}) is needed",
+            f"plots have shape {z.shape}; (lanes, steps, {', '.join(map(str, plot))}) is needed",
             why=f"the sensor measures {', '.join(recursion.sensor.names)}",
         )
     unknown = sorted(set(outputs) - set(OUTPUTS) - set(recursion.kept))

@@ -77,6 +77,18 @@ class Seeing(Protocol):
         """What its plots are of, and the formulas of what is measured of that."""
 
 
+class Guard(Protocol):
+    """Decides whether a plot can be the target's; a frozen dataclass of numbers.
+
+    One that has `candidates` is given so many plots (candidates, k), of which it takes one at most.
+    """
+
+    def admit(
+        self, prior: Gaussian, z: Array, components: Sequence[Component]
+    ) -> tuple[Array, Any]:
+        """The plot, NaN if it is turned away, and 1 if it was admitted, else 0."""
+
+
 def gaussian_layout(motion: Motion) -> dict[str, Leaf]:
     """The state of a filter that keeps a Gaussian in the motion's coordinates."""
     n = len(motion.names)
