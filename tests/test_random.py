@@ -22,23 +22,24 @@ extended = pytest.mark.skipif(
 )
 
 
-def fused(goal, runs, *, threads=1, rows=True):
-    """Normal numbers of a kernel that also has other use for them: (runs, 4, 3)."""
+def fused(goal, runs, *, threads=1, rows=True, name="drawn"):
+    """Normal numbers of a kernel that also has other work to do: (runs, 4, 3)."""
 
     def step(state, inputs):
-        drawn = random.normals(inputs["key"], state["run"], inputs["step"], int(STREAM), 3)
-        sums = state["sums"] + drawn + 0.3 * drawn[::-1]
-        return {"run": state["run"], "sums": sums}, {"drawn": drawn}
+        counter = state["run"], inputs["step"]
+        drawn, other = (random.normals(inputs["key"], *counter, int(s), 3) for s in (STREAM, 9))
+        sums = state["sums"] + 0.3 * other
+        return {"run": state["run"], "sums": sums}, {"drawn": drawn, "added": 2.5 + drawn}
 
     program = trace(
         step,
         state={"run": Scalar(), "sums": Vector(3)},
         inputs={"key": (Vector(2), Rate.FIXED), "step": (Scalar(), Rate.STEP)},
-        outputs={"drawn": (Vector(3), Rate.EACH)},
+        outputs={name: (Vector(3), Rate.EACH)},
     )
     start = pack_states(program.state, {"run": runs, "sums": np.zeros((len(runs), 3))})
     kernel = kernel_for(program, goal, rows=rows)
-    out = kernel.run(start, {"key": KEY, "step": np.arange(4.0)}, 4, threads=threads)[1]["drawn"]
+    out = kernel.run(start, {"key": KEY, "step": np.arange(4.0)}, 4, threads=threads)[1][name]
     return out if rows else from_blocks(out, len(runs))
 
 
@@ -68,10 +69,11 @@ def test_a_kernel_makes_the_numbers_that_numpy_makes(goal):
 
 
 def test_a_kernel_makes_the_numbers_of_seeds_to_the_last_bit():
-    """Though it makes them in another order, beside other work."""
+    """Though it makes them in another order, beside other work, and adds to them."""
     goal = seeds._kernel().code and seeds._kernel().code.goal
     want = seeds.normals(5, "cell", STREAM, (4, 3), runs=9)
     assert np.array_equal(fused(goal, np.arange(9.0)), want)
+    assert np.array_equal(fused(goal, np.arange(9.0), name="added"), 2.5 + want)
 
 
 @targets
