@@ -1,10 +1,13 @@
 """What a user gives the verbs `run` and `smooth`, made plain arrays and checked once."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from boresight.errors import UsageError
+from boresight.filters.method import Filter, Outside
+from boresight.filters.nearest import nearest
 from boresight.filters.recursion import Recursion
 from boresight.maths import Gaussian
 from boresight.models.checks import as_number
@@ -42,6 +45,54 @@ def plots(z: Any, sensor: Sensor) -> Array:
             next_step="give NaN where a component was not measured",
         )
     return array
+
+
+def candidates(given: Any, gate: float | None, start: Any, sensor: Sensor) -> Array | None:
+    """All plots of each scan (runs, scans, m, k), of which a gate takes one; None for one a scan.
+
+    Args:
+        given: what the user gave as plots.
+        gate: which they must have then.
+        start: which may not come from such plots.
+        sensor: what measured them.
+    """
+    many = getattr(given, "candidates", given if getattr(given, "ndim", 0) == 4 else None)
+    if many is None:
+        return None
+    array, k = np.asarray(as_number("plots", many)), len(sensor.names)
+    plots(array.reshape(len(array), -1, array.shape[-1]), sensor)
+    if gate is None:
+        raise UsageError(
+            f"each scan holds up to {array.shape[2]} plots, and a filter takes one",
+            next_step="pass gate=16: the nearest within that squared Mahalanobis distance is taken",
+        )
+    if isinstance(start, str) or (start is None and getattr(given, "prior", None) is None):
+        raise UsageError(
+            "no start from plots of which nobody knows whose they are",
+            next_step="give the start: start=Gaussian(mean, cov)",
+        )
+    return array.reshape(*array.shape[:3], k)
+
+
+def gated(
+    chosen: Filter | Outside, recursion: Recursion, gate: float, z: Array, many: Array | None
+) -> tuple[Recursion, Array]:
+    """The recursion with a gate, and what it chooses from: (runs, scans, m, k).
+
+    Args:
+        chosen: the filter, which must be one that predicts.
+        recursion: its recursion.
+        gate: largest squared Mahalanobis distance that is taken.
+        z: (runs, scans, k), chosen from where there is nothing else.
+        many: what `candidates` gave.
+    """
+    if isinstance(chosen, Outside):
+        raise UsageError(
+            f"{chosen.name!r} is a function over whole recordings, which cannot be given a gate",
+            next_step="pass it plots (runs, scans, k), or write the filter step by step",
+        )
+    choices = z[:, :, None] if many is None else many
+    return replace(recursion, guard=nearest(recursion.sensor, gate, choices.shape[2])), choices
 
 
 def steps(dt: Any, runs: int, scans: int) -> Array:

@@ -46,6 +46,7 @@ def run(
     dt: Array | None = None,
     start: Gaussian | Literal["one plot", "two plots"] | None = None,
     speed_mps: float | None = None,
+    gate: float | None = None,
     outputs: Sequence[str] = ("mean", "cov", "nis"),
     last: bool = False,
     threads: int = 1,
@@ -58,7 +59,7 @@ def run(
         motion: how the targets move.
         sensor: what measured the plots.
         plots: what `simulate` gives, or an array (runs, scans, k) in SI units and radians with
-            NaN where nothing was measured.
+            NaN where nothing was measured; (runs, scans, m, k) where a scan holds several.
         dt: seconds before each scan: a number, (1, scans), (runs, 1) or (runs, scans); the first
             scan's dt is the time since `start`. Left out: what `plots` carries.
         start: Gaussian with mean (n,) or (runs, n); or "one plot" or "two plots": made from the
@@ -66,6 +67,8 @@ def run(
             start). Left out: what `plots` carries, else "one plot".
         speed_mps: spread of each velocity of a start from one plot; left out, the filter's own: 300
             for radars' targets, 11 for a bank's contacts at sea.
+        gate: squared Mahalanobis distance beyond which a plot is not taken; of several the nearest
+            inside is. Left out: every plot is taken, and a scan may hold only one.
         outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status; of an `Outside`
             there are mean and cov.
         last: give outputs after the last scan only.
@@ -84,15 +87,18 @@ def run(
     chosen = catalogue.find(name)
     step = catalogue.lookup("ekf") if isinstance(chosen, Outside) else chosen
     recursion = step.with_settings(**settings).recursion(motion, sensor)
-    z = given.plots(getattr(plots, "z", plots), sensor)
+    many = given.candidates(plots, gate, start, sensor)
+    z = given.plots(getattr(plots, "z", plots if many is None else many[:, :, 0]), sensor)
     steps = given.steps(getattr(plots, "dt", None) if dt is None else dt, *z.shape[:2])
     given.fit(recursion, *z.shape[:2])
     if isinstance(sensor, Radar):
-        z = sensor.without_air(z)
+        z, many = (each if each is None else sensor.without_air(each) for each in (z, many))
     prior = getattr(plots, "prior", None) if start is None else start
     if prior is None or isinstance(prior, str):
         prior, z, steps = _start_from_plots(prior or "one plot", z, steps, recursion, speed_mps)
     prior = given.start(prior, motion)
+    if gate is not None:
+        recursion, z = given.gated(chosen, recursion, gate, z, many)
     if isinstance(chosen, Outside):
         return _run_outside(chosen, motion, sensor, z, steps, prior, last=last)
     found = run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
