@@ -183,14 +183,26 @@ def reproduce(
     assume: dict[str, Any],
     folder: Path | None,
 ) -> Answer:
-    """Repeat a paper's tables, figures and claims."""
+    """Repeat a paper's tables, figures and claims; with a folder, write the report into it."""
     from boresight.experiments.reproduce import SEED
     from boresight.experiments.reproduce import reproduce as repeat
 
     output = door.folder(folder) if folder else None
-    with progress(f"Reproducing {key}", manner):
-        seed = SEED if seed is None else seed
-        found = repeat(key, runs=runs, seed=seed, output=output, assume=assume)
+    with progress(f"Reproducing {key}", manner) as watch:
+        found = repeat(
+            key,
+            runs=runs,
+            seed=SEED if seed is None else seed,
+            output=output,
+            assume=assume,
+            progress=lambda name: watch.say(f"reproducing {name}"),
+        )
+        if output:
+            from boresight.interfaces.report import reproduce_page
+
+            watch.say("writing the report")
+            page = reproduce_page.page(key, found, manner.command)
+            found["report"] = str(page.save(output / REPORT))
     return Answer(
         content=found, screen=lambda width: screens_reproduce.reproduced(key, found, width)
     )

@@ -110,10 +110,11 @@ def report(
         raise UsageError(
             "a report needs tracks, a calibration, or both", next_step="report(tracks, calibration)"
         )
-    return Report(_page(parts, inspection, _provenance(inspection, command)))
+    return Report(_page(parts, inspection, provenance(inspection, command)))
 
 
-def _provenance(inspection: dict[str, Any], command: str) -> dict[str, Any]:
+def provenance(inspection: dict[str, Any], command: str) -> dict[str, Any]:
+    """What made a page: the file it is about, the command, and the versions of what computed."""
     found = {name: inspection[name] for name in ("file", "sha256") if inspection.get(name)}
     if command:
         found["command"] = command
@@ -144,7 +145,7 @@ def _page(parts: Sequence[Part], inspection: dict[str, Any], provenance: dict[st
         f'<title>{title} · boresight</title>\n<link rel="icon" href="data:,">\n'
         f"<style>\n{style}</style>\n</head>\n"
         f"<body>\n{sections.body(parts, inspection, provenance)}\n"
-        f'<script type="application/json" id="boresight-report">{_json(facts)}</script>\n'
+        f'<script type="application/json" id="boresight-report">{embedded(facts)}</script>\n'
         f'<script type="application/octet-stream" id="library">{charts.packed(charts.library())}'
         "</script>\n"
         f'<script type="application/octet-stream" id="drawing">{charts.packed_json(drawing)}'
@@ -152,6 +153,6 @@ def _page(parts: Sequence[Part], inspection: dict[str, Any], provenance: dict[st
     )
 
 
-def _json(facts: dict[str, Any]) -> str:
+def embedded(facts: dict[str, Any]) -> str:
     """The machine-readable part: what the page says, as JSON; `<` cannot end the element."""
     return json.dumps(plain(facts), allow_nan=False).replace("<", "\\u003c")
