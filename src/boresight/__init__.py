@@ -54,12 +54,15 @@ _WHERE = {
     "interfaces.reading": ["read"],
     "interfaces.python": ["inspect", "report", "run", "smooth", "stream", "track"],
 }
+_MODULES = ("maths", "testing")  # what a user's own filter is written with, and held to
 _NAMES = {name: module for module, names in _WHERE.items() for name in names}
-__all__ = sorted([*_NAMES, "__version__"])  # noqa: PLE0605 - built from the one table above
+__all__ = sorted([*_NAMES, *_MODULES, "__version__"])  # noqa: PLE0605 - built from the one table above
 
 
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used (PEP 562)."""
+    if name in _MODULES:
+        return import_module(f"boresight.{name}")
     if name not in _NAMES:
         raise AttributeError(f"module 'boresight' has no attribute {name!r}")
     value = getattr(import_module(f"boresight.{_NAMES[name]}"), name)

@@ -1,4 +1,6 @@
 # What type checkers and editors see of the lazy __init__; a test keeps the two equal.
+from boresight import maths as maths
+from boresight import testing as testing
 from boresight.calibration.correcting import correct as correct
 from boresight.catalogue import cite as cite
 from boresight.errors import BoresightError as BoresightError

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from boresight import catalogue
-from boresight.filters.posterior import Posterior
-from boresight.maths import Gaussian
 from boresight.maths.frames import Site
 from boresight.models.coordinates import CartesianPlots, PositionSensor
 from boresight.models.motion import (
@@ -20,25 +18,14 @@ from boresight.models.motion import (
     WithHeightOffset,
 )
 from boresight.models.sensors import Bearings, ConicalBearings, Pose, Radar
+from boresight.testing import World
+from boresight.testing.subjects import Stepping
+from boresight.testing.worlds import tilted, turned
 
-km, deg, mrad = 1e3, np.pi / 180, 1e-3
+km = 1e3
 SITE = Site(latitude_deg=51.1, longitude_deg=1.2, height_m=45.0)
 PLANE = ConstantVelocity(accel_mps2=2.0, dims=2)
 SPACE = ConstantVelocity(accel_mps2=2.0, dims=3)
-
-
-def turned(angle, dims=3):
-    """Rotation about z by `angle` rad."""
-    c, s = np.cos(angle), np.sin(angle)
-    R = np.eye(3)
-    R[:2, :2] = [[c, -s], [s, c]]
-    return R[:dims, :dims]
-
-
-def tilted(a, b):
-    """A rotation of no particular kind."""
-    c, s = np.cos(b), np.sin(b)
-    return turned(a) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) @ turned(b - a)
 
 
 POSE = Pose(
@@ -74,42 +61,6 @@ OBLONG = CartesianPlots(cov=np.array([[900.0, -500.0], [-500.0, 400.0]]))
 
 
 @dataclass(frozen=True, eq=False)
-class World:
-    """A motion, a sensor, and states that make sense in it."""
-
-    motion: Any
-    sensor: Any
-
-    def __str__(self):
-        seen = "-".join(name.split("_")[0] for name in self.sensor.names)
-        return f"{type(self.motion).__name__}{self.motion.dims}-{seen}"
-
-    def prior(self, seed):
-        """A mean some 5 to 60 km out and a full covariance (n, n), condition about 1e4."""
-        rng = np.random.default_rng(seed)
-        dims, n = self.motion.dims, len(self.motion.names)
-        spread = np.array([_SPREAD[name.rsplit("_", 1)[-1]] for name in self.motion.names])
-        spread[:dims] = 200.0
-        root = np.tril(rng.uniform(-0.5, 0.5, (n, n)), -1) + np.diag(rng.uniform(0.5, 1.5, n))
-        root *= spread[:, None]
-        mean = rng.normal(size=n) * spread
-        azimuth, ground = rng.uniform(-np.pi, np.pi), rng.uniform(5 * km, 60 * km)
-        mean[:2] = ground * np.cos(azimuth), ground * np.sin(azimuth)
-        if dims == 3:
-            mean[2] = rng.uniform(1 * km, 12 * km)
-        return mean, root @ root.T
-
-    def plot(self, mean, seed, sigmas=1.0):
-        """What the sensor would measure of `mean`, with noise."""
-        rng = np.random.default_rng((seed, 1))
-        parts = self.sensor.components(self.motion)
-        return np.array([c.value(mean) + sigmas * c.sigma * rng.normal() for c in parts])
-
-
-_SPREAD = {"m": 200.0, "mps": 80.0, "mps2": 3.0, "radps": 0.02, "km": 1.0}
-
-
-@dataclass(frozen=True, eq=False)
 class Entry:
     """One filter with settings.
 
@@ -136,19 +87,19 @@ class Entry:
     def __str__(self):
         return "-".join([self.name, *(str(v).replace(" ", "") for v in self.settings.values())])
 
-    def recursion(self, world):
-        """Predict and update in `world`."""
+    def on(self, world):
+        """The filter as the laws see it; skips where it is not made for the world."""
         if self.straight and isinstance(world.motion, CoordinatedTurn):
             pytest.skip("follows straight flight only")
-        chosen = catalogue.lookup(self.name).with_settings(**self.settings)
-        return chosen.recursion(world.motion, world.sensor)
+        return Stepping(catalogue.lookup(self.name).with_settings(**self.settings))
+
+    def recursion(self, world):
+        """Predict and update in `world`."""
+        return self.on(world).recursion(world)
 
     def update(self, world, mean, cov, z):
         """The formula itself, on floats: Posterior of one target."""
-        method, models = self.recursion(world).method, (world.motion, world.sensor)
-        state = method.begin(Gaussian(mean, cov), *models)
-        state, surprise = method.update(state, z, *models)
-        return Posterior(*method.output(state, *models), *surprise)
+        return self.on(world).update(world, mean, cov, z)
 
 
 RANGE_FIRST = ("range_m", "azimuth_rad", "elevation_rad")

@@ -7,30 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boresight.models.coordinates import CartesianPlots
+from boresight.testing.symmetries import kalman, some_plots
 from laws.enrolled import FILTERS, LINEAR_WORLDS, Entry
 from oracles import filters as textbook
 
 seeds = st.integers(0, 2**32)
 periods = st.floats(0.1, 20.0)
-
-
-def matrices(world):
-    """H and R of a sensor that measures the first coordinates."""
-    names = world.sensor.names
-    H = np.eye(len(names), len(world.motion.names))
-    if isinstance(world.sensor, CartesianPlots):
-        return H, world.sensor.cov
-    return H, np.diag([getattr(world.sensor, name) ** 2 for name in names])
-
-
-def textbook_run(world, mean, cov, plots, dt):
-    H, R = matrices(world)
-    F, Q = textbook.discrete_velocity(dt, world.motion.accel_mps2, world.motion.dims)
-    for z in plots:
-        mean, cov = textbook.predict(mean, cov, F, Q)
-        mean, cov, nis, loglik = textbook.joint_update(mean, cov, z, H, R)
-    return mean, cov, nis, loglik
 
 
 def our_run(entry, world, mean, cov, plots, dt):
@@ -47,24 +29,11 @@ def agree(ours, theirs):
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.max(np.abs(b)))
 
 
-def some_plots(world, mean, seed):
-    """Three plots; about one component in four is missing, and in the last plot one is there."""
-    rng = np.random.default_rng((seed, 2))
-    seen = mean[: len(world.sensor.names)]
-    plots = seen + rng.normal(scale=90.0, size=(3, len(seen)))
-    plots[rng.random(plots.shape) < 0.25] = np.nan
-    plots[-1, 0] = mean[0]
-    return plots
-
-
 @pytest.mark.parametrize("world", LINEAR_WORLDS, ids=str)
 @pytest.mark.parametrize("entry", [e for e in FILTERS if not e.own_state], ids=str)
 @given(seed=seeds, dt=periods)
 def test_equals_the_joint_kalman_filter_with_plots_missing(entry, world, seed, dt):
-    mean, cov = world.prior(seed)
-    plots = some_plots(world, mean, seed)
-    ours = our_run(entry, world, mean, cov, plots, dt)
-    agree(ours, textbook_run(world, mean, cov, plots, dt))
+    kalman(entry.on(world), world, seed, dt=dt)
 
 
 @pytest.mark.parametrize("name", ["ekf-sequential", "mekf"])
@@ -92,7 +61,7 @@ def test_iterating_changes_nothing(seed, iterations):
 
 @given(seed=seeds)
 def test_a_correlated_noise_is_used_and_missing_rows_are_left_out(seed):
-    from boresight.filters import kalman
+    from boresight.filters.kalman import update
     from boresight.maths import Gaussian
 
     world = LINEAR_WORLDS[0]
@@ -102,7 +71,7 @@ def test_a_correlated_noise_is_used_and_missing_rows_are_left_out(seed):
     R = root @ root.T + 100.0 * np.eye(3)
     z = H @ mean + rng.normal(scale=50.0, size=3)
     z[seed % 3] = np.nan
-    post = kalman.update(Gaussian(mean, cov), z, H, R)
+    post = update(Gaussian(mean, cov), z, H, R)
     expected = textbook.joint_update(mean, cov, z, H, R)
     agree((post.mean, post.cov, post.nis, post.loglik), expected)
     assert post.dof == 2

@@ -1,7 +1,5 @@
 """Many lanes are one lane many times: batch, loop and stream agree to the bit; failures stay."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
@@ -9,9 +7,10 @@ from boresight.errors import Status, UsageError
 from boresight.filters.recursion import OUTPUTS, run_recursion
 from boresight.filters.stream import Stream
 from boresight.maths import Gaussian
+from boresight.testing import lanes
+from boresight.testing.lanes import LANES, STEPS, recorded
 from laws.enrolled import BEARING_WORLDS, BY_EAR, FILTERS, LINEAR_WORLDS, POLAR_WORLDS
 
-LANES, STEPS = 5, 4
 PAIRS = [
     pytest.param(entry, world, id=f"{entry}-{world}")
     for entries, worlds in (
@@ -25,72 +24,23 @@ PAIRS = [
 everyone = pytest.mark.parametrize(("entry", "world"), PAIRS)
 
 
-@cache
-def recorded(world):
-    """Starts and plots of a few lanes; a component here and there is missing."""
-    priors = [world.prior(lane) for lane in range(LANES)]
-    start = Gaussian(*(np.stack(part) for part in zip(*priors, strict=True)))
-    z = np.stack(
-        [[world.plot(m, (lane, t)) for t in range(STEPS)] for lane, m in enumerate(start.mean)]
-    )
-    z[np.random.default_rng(1).random(z.shape) < 0.15] = np.nan
-    return start, z
-
-
 def part_of(start, lane):
     return Gaussian(start.mean[lane : lane + 1], start.cov[lane : lane + 1])
 
 
 @everyone
 def test_a_batch_is_its_lanes_and_a_run_is_its_steps_bit_for_bit(entry, world):
-    start, z = recorded(world)
-    recursion = entry.recursion(world)
-    batch = run_recursion(recursion, z, 2.0, start, outputs=OUTPUTS)
-    for lane in range(LANES):
-        states = part_of(start, lane)
-        for t in range(STEPS):
-            one = run_recursion(
-                recursion, z[lane : lane + 1, t : t + 1], 2.0, states, outputs=OUTPUTS
-            )
-            states = one.final
-            for name in OUTPUTS:
-                np.testing.assert_array_equal(one.others[name][0, 0], batch.others[name][lane, t])
-    if not (entry.own_state or entry.bank):
-        np.testing.assert_array_equal(batch.final["mean"], batch.mean[:, -1])
+    lanes.batch(entry.on(world), world)
 
 
 @everyone
 def test_a_stream_is_the_batch_bit_for_bit(entry, world):
-    start, z = recorded(world)
-    recursion = entry.recursion(world)
-    batch = run_recursion(recursion, z, 2.0, start, outputs=OUTPUTS)
-    alone, together = Stream(recursion), Stream(recursion, LANES)
-    first = alone.start(Gaussian(start.mean[3], start.cov[3]))
-    all_of_them = together.start(start)
-    state = first
-    for t in range(STEPS):
-        state, all_of_them = alone(state, z[3, t], 2.0), together(all_of_them, z[:, t], 2.0)
-        np.testing.assert_array_equal(all_of_them.status, batch.status[:, t])
-        assert state.status is Status.OK
-        for name in ("mean", "cov", "nis", "dof", "loglik"):
-            np.testing.assert_array_equal(getattr(state, name), batch.others[name][3, t])
-            np.testing.assert_array_equal(getattr(all_of_them, name), batch.others[name][:, t])
-    np.testing.assert_array_equal(first.mean, start.mean[3])  # state in, state out: nothing changed
+    lanes.stream(entry.on(world), world, rtol=0.0)
 
 
 @everyone
 def test_the_batch_is_the_formula_on_floats(entry, world):
-    start, z = recorded(world)
-    recursion = entry.recursion(world)
-    batch = run_recursion(recursion, z, 2.0, start, outputs=OUTPUTS)
-    for lane in range(LANES):
-        state = recursion.begin(start.mean[lane], start.cov[lane])
-        for t in range(STEPS):
-            state, results = recursion.step(state, {"z": z[lane, t], "dt": 2.0})
-            for name in OUTPUTS:
-                ours, floats = batch.others[name][lane, t], np.asarray(results[name])
-                size = np.nanmax(np.abs(floats), initial=1e-3)
-                np.testing.assert_allclose(ours, floats, rtol=1e-9, atol=1e-9 * size)
+    lanes.formula(entry.on(world), world)
 
 
 @everyone

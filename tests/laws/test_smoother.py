@@ -17,8 +17,8 @@ from boresight.filters.recursion import Estimate, run_recursion
 from boresight.filters.smoother import LINEARISATIONS, smooth
 from boresight.maths import Gaussian
 from boresight.models.motion import ConstantVelocity, Static
+from boresight.testing.symmetries import matrices
 from laws.enrolled import CURVED, LINEAR_WORLDS, MOTIONS, POLAR_WORLDS, Entry
-from laws.test_linear_world import matrices
 from oracles import filters as textbook
 from oracles import smoothers as oracle
 

@@ -6,30 +6,10 @@ Kalman's update: Bar-Shalom, Li & Kirubarajan (2001), table 5.2.4-1. EKF: the sa
 
 import numpy as np
 
+from boresight.testing import textbook
 
-def discrete_velocity(dt, accel, dims):
-    """F and Q of constant velocity with one random acceleration a step; [positions, velocities]."""
-    eye = np.eye(dims)
-    F = np.block([[eye, dt * eye], [np.zeros((dims, dims)), eye]])
-    G = np.vstack([0.5 * dt**2 * eye, dt * eye])
-    return F, accel**2 * G @ G.T
-
-
-def predict(mean, cov, F, Q):
-    """Mean and covariance one step later."""
-    return F @ mean, F @ cov @ F.T + Q
-
-
-def joint_update(mean, cov, z, H, R):
-    """All measured components at once; NaN ones are cut out of z, H and R."""
-    there = ~np.isnan(z)
-    z, H, R = z[there], H[there], R[np.ix_(there, there)]
-    S = H @ cov @ H.T + R
-    nu = z - H @ mean
-    W = cov @ H.T @ np.linalg.inv(S)
-    nis = nu @ np.linalg.inv(S) @ nu
-    loglik = -0.5 * (nis + np.log(np.linalg.det(2 * np.pi * S))) if there.any() else 0.0
-    return mean + W @ nu, cov - W @ S @ W.T, nis, loglik
+discrete_velocity, predict = textbook.discrete_velocity, textbook.predict
+joint_update = textbook.joint_update
 
 
 def polar(position):

@@ -78,13 +78,13 @@ def loaded(name: str, points: "tuple[EntryPoint, ...]") -> Filter | Outside:
     return as_filter(value, name=name, origin=f"what the package {whose} offers as {name!r}")
 
 
-def as_filter(value: Any, *, name: str = "", origin: str = "this") -> Filter | Outside:
+def as_filter(value: Any, *, name: str = "", origin: str = "") -> Filter | Outside:
     """A filter as it is, or an update formula as one.
 
     Args:
         value: what a user gave.
         name: what it must be called; empty: as it calls itself.
-        origin: whose it is, for the error.
+        origin: whose it is, for the error; empty: the caller's own.
 
     Raises:
         UsageError: it is no filter, or is called something else.
@@ -93,7 +93,8 @@ def as_filter(value: Any, *, name: str = "", origin: str = "this") -> Filter | O
         value = Filter(name=name or getattr(value, "__name__", "formula"), formula=value)
     if not isinstance(value, Filter | Outside):
         raise UsageError(
-            f"{origin} is no filter but a {type(value).__name__}",
+            f"{origin} is no filter" if origin else f"there is no filter {value!r}",
+            why=f"it is a {type(value).__name__}",
             next_step="give a name, a bs.Filter, a bs.Outside or a function "
             "update(prior, z, components)",
         )

@@ -1,1 +1,0 @@
-"""Laws that every filter keeps, to hold your own filter to."""
