@@ -18,7 +18,7 @@ from boresight.models.sensors import Radar, Sensor
 Array = Any
 SPEED_MPS = 300.0  # spread of an unknown velocity, each axis: covers airliners
 CONTACT_MPS = 11.0  # that of a contact at sea: 21 knots
-_SPREADS = {  # of further states, by the unit that ends their name
+SPREADS = {  # of further states, by the unit that ends their name
     "mps2": 10.0,  # 1 g
     "radps": 0.1,  # twice the standard rate of turn
     "m": 300.0,  # what weather makes of a pressure altitude
@@ -66,7 +66,7 @@ def one_plot(
     mean[:, :dims], cov[:, :dims, :dims] = position, spread
     for i in range(dims, n):
         unit = motion.names[i].rsplit("_", 1)[-1]
-        cov[:, i, i] = (speed_mps if i < 2 * dims else _SPREADS[unit]) ** 2
+        cov[:, i, i] = (speed_mps if i < 2 * dims else SPREADS[unit]) ** 2
     return Gaussian(mean, cov)
 
 
@@ -110,7 +110,7 @@ def on_bearing(
     mean[:, :2], cov[:, :2, :2] = _in_track_frame(position, J @ polar @ J.mT, sensor)
     for i in range(d, n):
         unit = motion.names[i].rsplit("_", 1)[-1]
-        cov[:, i, i] = (speed_mps if i < 2 * d else _SPREADS[unit]) ** 2
+        cov[:, i, i] = (speed_mps if i < 2 * d else SPREADS[unit]) ** 2
     return Gaussian(mean, cov)
 
 

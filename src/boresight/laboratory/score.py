@@ -169,8 +169,9 @@ class Score:
         found = means | {name: kept[name] for name in _SUMS} | {"final_m": final_m}
         if "percent fit error" in self.metrics:
             for name in self._channels:
-                share = np.sqrt(kept[f"off_{name}"] / kept[f"all_{name}"])
-                found[f"fit_error_{name}"] = 100.0 * share
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    share = np.sqrt(kept[f"off_{name}"] / kept[f"all_{name}"])
+                found[f"fit_error_{name}"] = np.where(np.isfinite(share), 100.0 * share, np.inf)
         if "convergence" in self.metrics:
             since = kept["converged_scan"]
             found["converged_scan"] = np.where(since < scans, since, np.inf)

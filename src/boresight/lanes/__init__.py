@@ -10,6 +10,7 @@ Nothing outside this folder knows how the code is made.
 from boresight.lanes.blocks import Kernel, States, from_blocks, make_kernel, pack_states, to_blocks
 from boresight.lanes.dual import copysign, gradient, isnan, jacobian, random_pair, reach, select
 from boresight.lanes.elementary import near_zero
+from boresight.lanes.interpreter import paired
 from boresight.lanes.places import BLOCK
 from boresight.lanes.program import Leaf, Matrix, Program, Rate, Scalar, Symmetric, Vector, trace
 from boresight.lanes.trace import Symbol
@@ -34,6 +35,7 @@ __all__ = [
     "make_kernel",
     "near_zero",
     "pack_states",
+    "paired",
     "random_pair",
     "reach",
     "select",
