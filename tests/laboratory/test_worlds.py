@@ -81,7 +81,7 @@ def test_velocities_are_the_derivatives_of_positions(speeds, heights):
     mean = (world.path[1:, d:] + world.path[:-1, d:]) / 2.0
     off = np.linalg.norm(middle - mean, axis=1)
     # Within a piece the trapezium errs by a²dt²/12v. Where a turn begins or ends between two scans,
-    # at six instants, it errs by a dt/4 at most, and by the whole rate of a climb that begins there.
+    # at six instants, it errs by a dt/4, and by the whole rate of a climb that begins there.
     assert np.sum(off > 1e-4) <= 6
     assert off.max() < (9.0 * 0.01 / 4.0 if heights is None else 40.0)
 
@@ -250,7 +250,7 @@ def test_a_real_jet_and_a_real_airliner_are_flown_again():
     world = recorded(states, site, dt_s=4, sensor=RADAR, target="407a19")
     told = states.filter(pl.col("address") == "407a19")["velocity"]
     speed = np.hypot(world.path[:, 3], world.path[:, 4])
-    assert told.min() * 0.98 < speed.min() < speed.max() < told.max() * 1.02
+    assert told.min() * 0.95 < speed.min() < speed.max() < told.max() * 1.05
 
 
 # --- random draws
