@@ -36,6 +36,7 @@ Array = Any
 _SUMS = 2**17  # numbers that a batch writes: 1 MiB
 _STORED = 2**21  # numbers that a batch has between its kernels: 16 MiB
 _LANES = 1024  # of a batch at most
+_TOLD = ("mean", "cov", "nis", "dof")
 
 
 def run_chunk(
@@ -66,6 +67,23 @@ def run_chunk(
         tree.add(batch.nodes(out["sums"], chunk.trial.score.columns))
     each = {name: np.concatenate([part[name] for part in runs]) for name in runs[0]}
     return Scores(first, count, each, tree.nodes, time.thread_time() - begun)
+
+
+def told_again(
+    study: Study, setting: Setting, contender: Contender, runs: int
+) -> tuple[Array, dict[str, Array]]:
+    """The first runs again, with all that the filter said at every scan.
+
+    Returns:
+        The truth (runs, scans, n), and `mean`, `cov`, `nis` and `dof` by name.
+    """
+    chunk, truths, parts = _Chunk(study, setting, contender), [], []
+    for batch in batches(0, runs, chunk.lanes):
+        truth, told = chunk.told(*chunk.begun(batch))
+        truths.append(truth[batch.counts])
+        parts.append({name: each[batch.counts] for name, each in told.items()})
+    named = {name: np.concatenate([part[name] for part in parts]) for name in _TOLD}
+    return np.concatenate(truths), named
 
 
 def trial_of(study: Study, setting: Setting, contender: Contender) -> Trial:
@@ -153,18 +171,22 @@ class _Chunk:
         kept = {name: final[f"kept.{name}"][counts] for name in score.layout}
         return score.of_runs(kept, final_m[counts], scans, scans - self.study.first_scan)
 
-    def run(self, batch: Batch) -> tuple[States, dict[str, Array]]:
-        """What is kept of each lane in the end, `sums` over blocks, and each lane's `final_m`."""
+    def begun(self, batch: Batch) -> tuple[dict[str, Array], Array, Gaussian]:
+        """Numbers of the world, where each truth starts, and where each filter does."""
         study, world = self.study, self.trial.world
         runs = [batch.runs * (draws == "each") for draws in (study.truth, study.noise)]
         values = world.values(study.seed, *runs) | self.scans | {"counts": batch.counts}
         origin = _drawn(study.truth, batch, partial(world.origins, study.seed))
-        start = self._start(batch, values, origin)
+        return values, origin, self._start(batch, values, origin)
+
+    def run(self, batch: Batch) -> tuple[States, dict[str, Array]]:
+        """What is kept of each lane in the end, `sums` over blocks, and each lane's `final_m`."""
+        values, origin, start = self.begun(batch)
         if self.fused is None:
             return self._apart(values, origin, start)
         lanes = len(batch.runs)
         parts = (
-            pack_states(_slots(world.state), {"truth": origin}),
+            pack_states(_slots(self.trial.world.state), {"truth": origin}),
             self.trial.recursion.states(start, lanes),
             self._nothing(lanes),
         )
@@ -203,19 +225,26 @@ class _Chunk:
         self, values: Mapping[str, Array], origin: Array, start: Gaussian
     ) -> tuple[States, dict[str, Array]]:
         """World, filter and score one after the other."""
-        scans, filtered = self.setting.scenario.scans, self.contender.filter
-        scene = self._world(values, origin, scans)
+        truth, told = self.told(values, origin, start)
+        given = {**values, **told, "truth": truth}
+        return score_kernel(self.trial).run(
+            self._nothing(len(truth)), given, self.setting.scenario.scans
+        )
+
+    def told(
+        self, values: Mapping[str, Array], origin: Array, start: Gaussian
+    ) -> tuple[Array, dict[str, Array]]:
+        """The truth, and what the filter says of it: world and filter one after the other."""
+        filtered = self.contender.filter
+        scene = self._world(values, origin, self.setting.scenario.scans)
         z, dt = scene["z"], self.scans["dt"][None]
         if isinstance(filtered, Outside):
             models = self.contender.motion, self.contender.sensor
             mean, cov = filtered(z, dt, Gaussian(*spread(start, len(z))), *models)
             nothing = np.zeros(z.shape[:2])
-            told = {"mean": mean, "cov": cov, "nis": nothing, "dof": nothing}
-        else:
-            wanted = ("mean", "cov", "nis", "dof")
-            told = run_recursion(self.trial.recursion, z, dt, start, outputs=wanted).others
-        given = {**values, **told, "truth": scene["truth"]}
-        return score_kernel(self.trial).run(self._nothing(len(z)), given, scans)
+            return scene["truth"], {"mean": mean, "cov": cov, "nis": nothing, "dof": nothing}
+        told = run_recursion(self.trial.recursion, z, dt, start, outputs=_TOLD).others
+        return scene["truth"], told
 
 
 def _slots(layout: Mapping[str, Leaf]) -> tuple[Slot, ...]:
