@@ -14,6 +14,7 @@ cannot raise: it carries a `Status`, and whoever reads the lane turns it into a 
 
 from collections.abc import Iterable
 from enum import IntEnum
+from typing import Any
 
 
 class BoresightError(Exception):
@@ -39,6 +40,11 @@ class BoresightError(Exception):
             if text:
                 parts.append(f"  {label + ':':<6}{text}")
         return "\n".join(parts)
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """What an error has to say to programs beside its parts."""
+        return {}
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep the parts when the error crosses a process boundary."""

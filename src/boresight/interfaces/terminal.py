@@ -75,9 +75,9 @@ def complain(error: BoresightError, manner: Manner) -> None:
     """Print an error on standard error, and with `--json` as the one object on standard output."""
     sys.stderr.write(f"error: {error}\n")
     if manner.as_json:
-        parts = {"what": error.what, "where": error.where, "why": error.why}
-        parts |= {"next_step": error.next_step}
-        write_object({"error": parts | {"exit_code": error.exit_code}})
+        parts: dict[str, Any] = {"what": error.what, "where": error.where, "why": error.why}
+        parts |= {"next_step": error.next_step, "exit_code": error.exit_code}
+        write_object({"error": parts | error.details})
 
 
 @contextmanager
