@@ -88,7 +88,7 @@ def _told(one: _Heard, shift: Bias) -> dict[str, float | None]:
 def _altered(study: Study, found: dict[str, _Heard]) -> Claim:
     """Two manoeuvres of which the biases differ are enough."""
     gaps = {
-        f"{a} less {b.removeprefix('then ')}": bias(found[a].range_error - found[b].range_error)
+        f"{a} less {b.removeprefix(_COURSE)}": bias(found[a].range_error - found[b].range_error)
         for a, b in combinations(found, 2)
     }
     size, error = (np.array([np.abs(gap[i]) for gap in gaps.values()]) for i in (0, 1))
@@ -116,7 +116,7 @@ def _best(found: dict[str, _Heard], shift: dict[str, Bias]) -> Claim:
     }
     value, error = (np.array([gap[i] for gap in gaps.values()]) for i in (0, 1))
     ours = {
-        f"less {course.removeprefix('then ')}": _with_error(gap) for course, gap in gaps.items()
+        f"less {course.removeprefix(_COURSE)}": _with_error(gap) for course, gap in gaps.items()
     }
     return part(
         "PR-C7",

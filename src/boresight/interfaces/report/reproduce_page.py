@@ -3,6 +3,7 @@
 It has no script: claims are shown by verdict with boxes that style sheets read.
 """
 
+import json
 import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -14,14 +15,13 @@ from typing import Any
 
 from boresight.interfaces.report import tables
 from boresight.interfaces.report.page import Report, embedded, provenance
-from boresight.interfaces.report.reproduce_rows import KINDS, article, badge, value
+from boresight.interfaces.report.reproduce_rows import KINDS, article, badge
 from boresight.interfaces.report.words import Cell, number_cell, table, text_cell
 
 POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
     "form-action 'none'"
 )
-SUFFIXES = {".png": "image/png", ".webp": "image/webp"}
 WIDEST_PX, QUALITY = 1400, 80
 MEANINGS = {
     "reproduces": "a number lies in the band of single runs of ours and within 5 % of their "
@@ -32,6 +32,10 @@ MEANINGS = {
     "does not reproduce": "a number lies outside the band; a sentence is false in 95 % of our runs",
     "cannot be checked": "what it depends on is not printed, or is not to be had",
 }
+STRIPS = (
+    "Where a number was printed, a strip shows it as an upright line, our median as a dot and the "
+    "band of our single runs, 5 to 95 %, as a bar."
+)
 FOOT = (
     "This page is complete in one file: it loads nothing and runs nothing. What it says is also in "
     "it as JSON, in the element <code>boresight-report</code>; the numbers of each figure are in "
@@ -111,13 +115,12 @@ def _overview(found: Mapping[str, Any]) -> str:
         [
             Cell(f'<a href="#{name}">{name}</a>'),
             *(number_cell(_number(rows, verdict)) for verdict in KINDS),
-            number_cell(len(rows)),
         ]
         for name, rows in _by_paper(found).items()
     ]
-    counts = table("Verdicts by paper", ["paper", *KINDS, "rows"], counted)
+    counts = table("Verdicts by paper", ["paper", *KINDS], counted)
     chips = "".join(
-        f'<p class="chips"><b>{name}</b> {" ".join(map(_chip, rows))}</p>'
+        f'<p class="chips"><b>{name}</b> <span>{" ".join(map(_chip, rows))}</span></p>'
         for name, rows in _by_paper(found).items()
     )
     meanings = "".join(
@@ -126,7 +129,8 @@ def _overview(found: Mapping[str, Any]) -> str:
     return _section(
         "overview",
         "Overview",
-        f'<div class="halves">{counts}<dl class="meanings">{meanings}</dl></div>'
+        f'<div class="halves"><div>{counts}<p class="how">{STRIPS}</p></div>'
+        f'<dl class="meanings">{meanings}</dl></div>'
         f"<h3>Every row</h3>{chips}",
     )
 
@@ -154,13 +158,17 @@ def _section(name: str, title: str, html: str) -> str:
 
 def _paper(key: str, found: Mapping[str, Any]) -> str:
     """One paper: where it is from, what was assumed, and its rows."""
-    pictures = {Path(name).stem: Path(name) for name in found["figures"] if _is_picture(name)}
+    pictures = {Path(name).stem: Path(name) for name in found["figures"] if name.endswith(".png")}
     articles = []
     for claim in _by_paper(found)[key]:
         mine = [stem for stem in pictures if re.fullmatch(f"{stem}[a-z]?", claim["id"])]
         articles.append(article(claim, [_picture(pictures.pop(stem)) for stem in mine]))
     entries = [
-        [text_cell(name), Cell(escape(value(each["value"]))), Cell(escape(each["why"]))]
+        [
+            text_cell(name),
+            Cell(f"<code>{escape(json.dumps(each['value'], ensure_ascii=False))}</code>"),
+            Cell(escape(each["why"])),
+        ]
         for name, each in found["assumed"][key].items()
     ]
     assumed = table("", ["name", "value", "why"], entries)
@@ -182,29 +190,19 @@ def _reference(key: str) -> str:
     return f"{authors}: <cite>{plain.get('title', '')}</cite>, {plain.get('year', '')}."
 
 
-def _is_picture(name: str) -> bool:
-    return Path(name).suffix in SUFFIXES
-
-
 def _picture(file: Path) -> str:
-    """A figure, drawn from our runs, in the page itself."""
-    alt = f"{file.stem}, drawn from our runs; its numbers are in {file.stem}.csv"
-    return (
-        f'<figure><img alt="{escape(alt)}" loading="lazy" src="{_inside(file)}">'
-        f"<figcaption>{escape(alt)}</figcaption></figure>"
-    )
-
-
-def _inside(file: Path) -> str:
-    """A picture as text, smaller than the file."""
+    """A figure, drawn from our runs, in the page itself and smaller than its file."""
     from PIL import Image  # matplotlib, which drew it, needs it too
 
     picture, small = Image.open(file).convert("RGB"), BytesIO()
-    if picture.width > WIDEST_PX:
-        height = round(picture.height * WIDEST_PX / picture.width)
-        picture = picture.resize((WIDEST_PX, height), Image.Resampling.LANCZOS)
+    picture.thumbnail((WIDEST_PX, WIDEST_PX), Image.Resampling.LANCZOS)
     picture.save(small, "webp", quality=QUALITY, method=2)
-    return f"data:{SUFFIXES['.webp']};base64,{b64encode(small.getvalue()).decode()}"
+    data = b64encode(small.getvalue()).decode()
+    alt = f"{file.stem}, drawn from our runs; its numbers are in {file.stem}.csv"
+    return (
+        f'<figure><img alt="{escape(alt)}" width="{picture.width}" height="{picture.height}" '
+        f'src="data:image/webp;base64,{data}"><figcaption>{escape(alt)}</figcaption></figure>'
+    )
 
 
 def _settings(found: Mapping[str, Any], command: str) -> str:

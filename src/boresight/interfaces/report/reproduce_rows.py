@@ -20,7 +20,6 @@ LONG = 4  # values of a list that are all shown
 FOLDED = 12  # parts from which on they are folded away
 STRIP_PX, STRIP_MARGIN = 150, 0.06
 TOO_WIDE_RATIO = 20.0  # a strip of positive numbers this far apart is logarithmic
-_KEYED = "border: what single runs of ours are; |: published; o: ours"
 
 
 def badge(verdict: str) -> str:
@@ -36,6 +35,8 @@ def value(found: Any, digits: int = 4) -> str:
     if isinstance(found, (int, float)):
         return figure(found, digits)
     if isinstance(found, (list, tuple)):
+        if not found:
+            return "none"
         if len(found) > LONG:
             return f"{value(found[0])}, {value(found[1])}, ... {value(found[-1])}"
         return (" to " if _is_band(found) else ", ").join(map(value, found))
@@ -71,18 +72,30 @@ def _numbers(claim: Claim) -> str:
     """Tables of what has one value each, and of what has several."""
     theirs, band = (_mapping(claim[key]) for key in ("published", "band"))
     ours = claim["ours"] if isinstance(claim["ours"], Mapping) else {"": claim["ours"]}
-    several = {name: each for name, each in ours.items() if _is_row(each)}
-    single = {name: each for name, each in ours.items() if name not in several}
+    several, single = _several(ours), {name: one for name, one in ours.items() if not _is_row(one)}
     verdicts = {_own_name(claim, part): part["verdict"] for part in claim.get("parts", ())}
-    if several and tuple(next(iter(several.values()))) == tuple(theirs):
-        several, theirs = {"published": theirs, **several}, {}
-    whole = {} if isinstance(claim["band"], Mapping) else {"": claim["band"]}
-    html = _single(theirs, single, {**whole, **band}, verdicts) if single or theirs else ""
-    rows = list(several.items())
-    rows += [(f"{name}, published", each) for name, each in theirs.items() if _is_row(each)]
-    for heads, group in groupby(rows, key=lambda row: tuple(row[1])):
+    if several and tuple(several[0][1]) == tuple(theirs):
+        several, theirs = [("published", theirs), *several], {}
+    if _is_band(claim["band"]):
+        band = {"": claim["band"]}
+        single |= {"": None} if "" not in single else {}
+    html = _single(theirs, single, band, verdicts) if single or theirs else ""
+    several += [(f"{name}, published", each) for name, each in _several(theirs)]
+    several += [(f"{name}, band of ours", each) for name, each in _several(band)]
+    for heads, group in groupby(several, key=lambda row: tuple(row[1])):
         html += _matrix(heads, list(group))
     return html
+
+
+def _several(found: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Rows of what has several values; of rows in rows each is one."""
+    rows: list[tuple[str, Mapping[str, Any]]] = []
+    for name, each in found.items():
+        if _is_row(each) and all(map(_is_row, each.values())):
+            rows += [(f"{name}, {inner}", values) for inner, values in each.items()]
+        elif _is_row(each):
+            rows.append((name, each))
+    return rows
 
 
 def _mapping(found: Any) -> Mapping[str, Any]:
@@ -107,8 +120,8 @@ def _single(
     names = [name for name in dict.fromkeys((*theirs, *ours)) if not _is_row(theirs.get(name))]
     rows = [
         [
-            text_cell(name or "value"),
-            *(_cell(each.get(name)) if name in each else Cell("") for each in (theirs, ours, band)),
+            text_cell(name or ("value" if ours.get(name) is not None else "band")),
+            *(_cell(each.get(name)) for each in (theirs, ours, band)),
             Cell(_strip(theirs.get(name), ours.get(name), band.get(name))),
             Cell(badge(verdicts[name]) if name in verdicts else ""),
         ]
@@ -120,7 +133,9 @@ def _single(
 
 
 def _cell(found: Any) -> Cell:
-    """Numbers to the right."""
+    """Numbers to the right, nothing for none."""
+    if found is None:
+        return Cell("", is_figure=True)
     is_figure = isinstance(found, (int, float)) and not isinstance(found, bool)
     return Cell(escape(value(found)), is_figure=is_figure or _is_band(found))
 
@@ -152,7 +167,8 @@ def _strip(theirs: Any, ours: Any, band: Any) -> str:
     at = [_place((each - lowest) / (highest - lowest)) for each in shown]
     dot = f'<circle cx="{at[3]}" cy="8" r="3.5"/>' if len(at) > 3 else ""
     return (
-        f'<svg class="strip" viewBox="0 0 {STRIP_PX} 16" role="img" aria-label="{_KEYED}">'
+        f'<svg class="strip" viewBox="0 0 {STRIP_PX} 16" role="img" '
+        f'aria-label="published {value(theirs)}, band {value(band)}">'
         f'<rect x="{at[1]}" y="4" width="{max(at[2] - at[1], 1):.1f}" height="8"/>{dot}'
         f'<path d="M{at[0]} 0V16"/></svg>'
     )
@@ -176,7 +192,7 @@ def _parts(claim: Claim) -> str:
     if not html:
         return ""
     is_open = " open" if len(rest) <= FOLDED else ""
-    return f"<details{is_open}><summary>Made of {len(rest)}</summary>{html}</details>"
+    return f"<details{is_open}><summary>{len(rest)} parts</summary>{html}</details>"
 
 
 def _plain(claim: Claim, parts: list[Claim]) -> str:
@@ -185,7 +201,7 @@ def _plain(claim: Claim, parts: list[Claim]) -> str:
             text_cell(_own_name(claim, part)),
             _cell(part["published"]),
             _cell(part["ours"]),
-            _cell(part["band"]) if part["band"] is not None else Cell(""),
+            _cell(part["band"]),
             Cell(_strip(part["published"], part["ours"], part["band"])),
             Cell(badge(part["verdict"])),
             Cell(escape(part["assumption"])),
