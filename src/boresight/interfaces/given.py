@@ -1,5 +1,6 @@
 """What a user gives the verbs `run` and `smooth`, made plain arrays and checked once."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -137,3 +138,15 @@ def fit(recursion: Recursion, runs: int, scans: int) -> None:
                 f"{name} has shape {shape}, and the plots are of {runs} runs and {scans} scans",
                 next_step="put runs first and scans second, each 1 long where it is constant",
             )
+
+
+def told(name: str, outputs: Sequence[str]) -> None:
+    """UsageError where more is asked of a function over whole recordings than it tells."""
+    usual = ("mean", "cov", "nis")  # the last is what nobody asked for: `run` gives it by default
+    further = [each for each in outputs if each not in usual]
+    if further:
+        raise UsageError(
+            f"{name} tells no {further[0]!r}",
+            why="it is a function over whole recordings",
+            next_step='leave outputs out, or ask for "mean" and "cov"',
+        )

@@ -100,6 +100,7 @@ def run(
     if gate is not None:
         recursion, z = given.gated(chosen, recursion, gate, z, many)
     if isinstance(chosen, Outside):
+        given.told(chosen.name, outputs)
         return _run_outside(chosen, motion, sensor, z, steps, prior, last=last)
     found = run_recursion(recursion, z, steps, prior, outputs=outputs, last=last, threads=threads)
     return replace(found, others=found.others | {"dt": steps})
