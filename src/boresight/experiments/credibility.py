@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from boresight.errors import UsageError
-from boresight.experiments.consistency import normalised_squares
+from boresight.experiments.metrics import normalised
 
 Array = Any
 _QUANTILES = 4096
@@ -57,14 +57,21 @@ def credibility(errors: Array, covs: Array, mse: Array | None = None) -> Credibi
         raise UsageError(f"{runs} runs cannot tell the mean square error of {n} states")
     with np.errstate(invalid="ignore"):
         actual = mean_square_error(errors) if mse is None else np.asarray(mse, dtype=float)
-    claimed = normalised_squares(errors, covs)
-    should = normalised_squares(errors, np.broadcast_to(actual, (*errors.shape, n)))
+    claimed = _squares(errors, covs)
+    should = _squares(errors, np.broadcast_to(actual, (*errors.shape, n)))
     sound = np.isfinite(claimed) & np.isfinite(should)
     with np.errstate(divide="ignore", invalid="ignore"):
         level = 10.0 * np.log10(claimed / should)
     level = np.where(claimed == should, 0.0, level)  # both are 0 where there is no error
     level = np.where(sound, level, np.inf)
     return Credibility(np.mean(np.abs(level), axis=0), np.mean(level, axis=0))
+
+
+def _squares(errors: Array, covs: Array) -> Array:
+    """Quadratic forms e' P^-1 e (runs, ...); infinite where that is no number."""
+    runs, *between, n = errors.shape
+    flat = errors.reshape(runs, -1, n), np.reshape(covs, (runs, -1, n, n))
+    return normalised(*flat).reshape(runs, *between)
 
 
 def credible(runs: int) -> Credibility:

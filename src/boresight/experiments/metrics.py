@@ -110,11 +110,15 @@ def nees(estimate: Estimate, truth: Truth) -> Array:
 
     Infinite where P is not positive definite.
     """
-    error = errors(estimate, truth)
+    return normalised(errors(estimate, truth), _output(estimate, "cov"))
+
+
+def normalised(error: Array, cov: Array) -> Array:
+    """Quadratic forms e' P^-1 e of errors (runs, scans, n), covariances (runs, scans, n, n)."""
     runs, scans, n = error.shape
     kernel = _nees_kernel(n)
     none = pack_states(kernel.program.state, {"unused": np.zeros(runs)})
-    values = {"error": error, "cov": _output(estimate, "cov")}
+    values = {"error": error, "cov": cov}
     with np.errstate(all="ignore"):
         square = kernel.run(none, values, scans)[1]["nees"]
     return np.where(np.isfinite(square), square, np.inf)

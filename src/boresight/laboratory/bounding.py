@@ -1,0 +1,97 @@
+"""The bounds of a setting, from the first of its trajectories."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from boresight.errors import UsageError
+from boresight.experiments.bounds import bound_averaged, bound_per_trajectory
+from boresight.experiments.metrics import elements
+from boresight.experiments.scenario import Scenario
+from boresight.experiments.simulate import Plots, Truth, simulate
+from boresight.laboratory.study import Study
+
+Array = Any
+_TRAJECTORIES = 1000
+_STEPS = 100_000  # of all trajectories together: what is stored of them stays below 100 MB
+
+
+class Bound(NamedTuple):
+    """What no unbiased filter does better than, on average.
+
+    Attributes:
+        position_m: root of the mean position variance over trajectories and scored scans.
+        standard_error_m: of that, from how much trajectories differ; NaN of a single one.
+        information_m: the same of the bound averaged in information; NaN where there is none.
+        per_scan_m2: (scans,) mean position variance.
+        trajectories: how many.
+        remarks: what was assumed.
+    """
+
+    position_m: float
+    standard_error_m: float
+    information_m: float
+    per_scan_m2: Array
+    trajectories: int
+    remarks: tuple[str, ...]
+
+
+def nothing(scenario: Scenario, *remarks: str) -> Bound:
+    """No bound."""
+    return Bound(np.nan, np.nan, np.nan, np.full(scenario.scans, np.nan), 0, remarks)
+
+
+def bound_of(study: Study, scenario: Scenario) -> Bound:
+    """Both bounds of a scenario; its own motion and sensor are known to whoever attains them."""
+    runs = min(study.runs, _TRAJECTORIES, max(1, _STEPS // scenario.scans))
+    is_one_truth = study.truth == "one" or scenario.path is not None
+    if is_one_truth and scenario.detection == 1.0 and not scenario.spent:
+        runs = 1  # nothing that a bound depends on differs between runs
+    truth, plots = simulate(
+        scenario,
+        runs=runs,
+        seed=study.seed,
+        truth_run=0 if study.truth == "one" else None,
+        noise_run=0 if study.noise == "one" else None,
+    )
+    try:
+        return _bound(study, scenario, truth, plots)
+    except (UsageError, np.linalg.LinAlgError) as error:
+        return nothing(scenario, f"No Cramer-Rao bound of {scenario.name}: {error}.")
+
+
+def _bound(study: Study, scenario: Scenario, truth: Truth, plots: Plots) -> Bound:
+    at, scored = elements(truth.names, "position"), slice(study.first_scan, None)
+    each = bound_per_trajectory(truth, plots, scenario.motion, scenario.sensor)
+    variance = np.sum(each[:, :, at, at], axis=-1)
+    of_runs = np.mean(variance[:, scored], axis=1)
+    position, runs = float(np.sqrt(np.mean(of_runs))), len(of_runs)
+    spread = float(np.std(of_runs, ddof=1) / np.sqrt(runs)) if runs > 1 else np.nan
+    remarks = [_told(scenario, runs)]
+    try:
+        detection = scenario.detection * (np.arange(scenario.scans) >= scenario.spent)
+        models = scenario.motion, scenario.sensor
+        average = bound_averaged(truth, plots.prior, *models, dt=plots.dt, detection=detection)
+        traces = np.sum(average[scored, at, at], axis=-1)
+        information = float(np.sqrt(np.mean(traces)))
+    except UsageError as error:
+        information = np.nan
+        remarks.append(f"{scenario.name}: {error}.")
+    error_m = spread / (2 * position) if position else np.nan
+    return Bound(position, error_m, information, np.mean(variance, axis=0), runs, tuple(remarks))
+
+
+def _told(scenario: Scenario, runs: int) -> str:
+    """On what the bound rests."""
+    first = "trajectory" if runs == 1 else f"{runs:,} trajectories"
+    words = f"The Cramer-Rao bound of {scenario.name} is that of the first {first}"
+    if scenario.path is not None:
+        words += (
+            f"; the path is given, and the bound assumes the process noise of {scenario.motion!r}"
+        )
+    if scenario.begin == "given":
+        words += "; filters start at the given state and not at a draw around it, so that at first "
+        words += "errors may lie below it"
+    if scenario.false_plots:
+        words += "; false plots are not in it, so it is lower than it needs to be"
+    return f"{words}."
