@@ -68,6 +68,7 @@ def simulate(
     first: int = 0,
     truth_run: int | None = None,
     noise_run: int | None = None,
+    whole: bool = False,
 ) -> tuple[Truth, Plots]:
     """Truth and plots of many runs of a scenario.
 
@@ -81,6 +82,8 @@ def simulate(
         truth_run: number of the run whose truth all have; None: each has its own.
         noise_run: number of the run whose plots' noise, detection, false plots and start all have;
             None: each has its own.
+        whole: keep the plots that make the start, as a recording has them; they are otherwise
+            missing, so that no filter uses them twice.
 
     Returns:
         The truth and the plots; `bs.run` takes the plots as they are.
@@ -103,6 +106,8 @@ def simulate(
     _, out = kernel.run(pack_states(kernel.program.state, {"truth": origin}), values, scene.scans)
     truth = Truth(scene.time_s, out["truth"], scene.motion.names, origin)
     begun = begin(scene, scene.motion, world.sensor, out["z"], starts(scene, seed, noisy, runs))
+    if whole:
+        return truth, Plots(scene.time_s, out["z"], scene.dt, begun, out.get("candidates"))
     return truth, _plots(scene, out["z"], out.get("candidates"), begun)
 
 
