@@ -33,7 +33,7 @@ from boresight.maths import Gaussian
 from boresight.models.motion import Motion
 
 Array = Any
-_SUMS = 2**17  # numbers that a batch writes: 1 MiB
+_SUMS = 2**18  # numbers that a batch writes: 2 MiB
 _STORED = 2**21  # numbers that a batch has between its kernels: 16 MiB
 _LANES = 1024  # of a batch at most
 _TOLD = ("mean", "cov", "nis", "dof")
