@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from boresight.laboratory.result import Cell, StudyResult
 
-WIDE = 100
+WIDE = 110
 STYLES = {"consistent": "green", "too sure": "red", "too modest": "yellow", "no number": "red"}
 DETAILED = 4  # settings whose verdicts are printed in full; the report has them all
 
