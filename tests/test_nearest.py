@@ -13,6 +13,7 @@ from boresight.experiments.worlds import waypoints
 from boresight.filters.nearest import Nearest, nearest
 from boresight.filters.recursion import run_recursion
 from boresight.maths import Gaussian
+from boresight.models.coordinates import PositionSensor
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Radar
 from oracles.nearest import nearest_neighbour
@@ -141,6 +142,21 @@ def test_a_chirp_s_correlation_is_in_the_gate():
     for factor, expected in ((1.0 + 1e-9, 1.0), (1.0 - 1e-9, 0.0)):
         _, inside = nearest(radar, limit * factor, 1).admit(prior, z[1:], radar.components(planar))
         assert inside == expected
+
+
+def test_a_plot_that_lacks_a_coordinate_is_judged_by_the_other():
+    """Which is far from the prediction by its own variance, whatever the two share."""
+    sensor = PositionSensor(x_m=3.0, y_m=4.0)
+    cov = np.diag([0.0, 0.0, 1.0, 1.0])
+    cov[:2, :2] = [[100.0, 90.0], [90.0, 100.0]]
+    prior, parts = (
+        Gaussian(np.zeros(4), cov),
+        sensor.components(ConstantVelocity(accel_mps2=0.0, dims=2)),
+    )
+    for z, distance in (([20.0, np.nan], 400.0 / 109.0), ([np.nan, 20.0], 400.0 / 116.0)):
+        for factor, expected in ((1.0 + 1e-9, 1.0), (1.0 - 1e-9, 0.0)):
+            gate = nearest(sensor, distance * factor, 1)
+            assert gate.admit(prior, np.array([z]), parts)[1] == expected
 
 
 def test_nothing_is_taken_of_nothing():
