@@ -4,8 +4,8 @@
 Differs from it: the actual mean square error is taken from the same runs, whose number is then the
 index's resolution. If errors are Gaussian and the claim is exact, each ratio of the two quadratic
 forms is a chi-square variable with `runs` degrees of freedom over their number, whatever the number
-of states (the run's own error, counted in the matrix, makes this exact); `credible` tells what the
-indices average to then.
+of states (the run's own error, counted in the matrix, makes this exact): an index of about
+4.9 / sqrt(runs) dB is chance.
 """
 
 from typing import Any, NamedTuple
@@ -16,7 +16,6 @@ from boresight.errors import UsageError
 from boresight.experiments.metrics import normalised
 
 Array = Any
-_QUANTILES = 4096
 
 
 class Credibility(NamedTuple):
@@ -72,12 +71,3 @@ def _squares(errors: Array, covs: Array) -> Array:
     runs, *between, n = errors.shape
     flat = errors.reshape(runs, -1, n), np.reshape(covs, (runs, -1, n, n))
     return normalised(*flat).reshape(runs, *between)
-
-
-def credible(runs: int) -> Credibility:
-    """What the indices of an exact claim average to, if errors are Gaussian, with so many runs."""
-    from scipy.special import chdtri
-
-    middle = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
-    level = 10.0 * np.log10(chdtri(runs, middle) / runs)
-    return Credibility(float(np.mean(np.abs(level))), float(np.mean(level)))

@@ -35,8 +35,8 @@ def _error(cell: Cell, percent: str) -> str:
     if math.isfinite(cell.ratio_to_bound):
         words += f", {cell.ratio_to_bound:.3f} times the Cramer-Rao bound of "
         words += f"{number(cell.pcrlb_m)} m"
-    if cell.ratio_to_bound < 1.0:
-        words += ", which it can be below where it is biased or starts better than was assumed"
+    if error.high < cell.pcrlb_m:
+        words += ": a bias or a start better than was assumed must help it"
     return f"{words}; it takes {number(cell.ns_per_step)} ns a step."
 
 
