@@ -56,7 +56,8 @@ def checked(raw: Mapping[str, Any]) -> tuple[StudyFile, list[Mistake]]:
             if not mistakes:
                 mistakes = [_mistake(each, path, left) for each, path in found]
             for each, path in found:
-                _mend(left, each, path, mended)
+                if _path(path, left) == path:  # it was not taken out with another
+                    _mend(left, each, path, mended)
 
 
 def near(name: str, known: list[str]) -> str:
@@ -103,7 +104,7 @@ def _prune(raw: dict[str, Any], path: Path) -> None:
     whole = next((i for i, part in enumerate(path) if isinstance(part, int)), len(path))
     path = path if path[:1] == ("filter",) else path[:whole]
     if path:
-        _at(raw, path[:-1]).pop(path[-1], None)
+        del _at(raw, path[:-1])[path[-1]]
     else:
         raw.clear()
 

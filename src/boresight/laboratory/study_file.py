@@ -72,7 +72,6 @@ from boresight.laboratory.study_filters import contenders_of
 from boresight.laboratory.study_models import StudyFile
 from boresight.laboratory.study_worlds import world_of
 from boresight.laboratory.sweep import Variant, variants
-from boresight.laboratory.toml_places import Path as TomlPath
 from boresight.maths import seeds
 
 _LARGEST = 1_000_000  # bytes of a file that somebody wrote
@@ -204,17 +203,24 @@ def _setting(
     if world is not None and file.first_scan >= world.scans:
         what = f"first_scan = {file.first_scan} is not before the last of {world.scans} scans"
         wrong.append(Mistake(("first_scan",), what, "score from an earlier scan"))
-    told = [each.path for each in found]
-    found += [each for each in wrong if not any(_is_inside(path, each.path) for path in told)]
-    mistakes += [variant.located(each) for each in found]
+    mistakes += [variant.located(each) for each in _causes(found, wrong)]
     if world is None:
         return file, None
     return file, Setting(values=variant.values, scenario=world, contenders=contenders)
 
 
-def _is_inside(path: TomlPath, table: TomlPath) -> bool:
-    """Whether a mistake explains another, of the table around it or of the very same setting."""
-    return path[: len(table)] == table
+def _causes(found: list[Mistake], wrong: list[Mistake]) -> list[Mistake]:
+    """What is wrong with the file, and what is wrong with what it says: causes, not effects.
+
+    What a table cannot be made for may follow from what is wrong inside it; that is told alone.
+    """
+    causes = [*found]
+    for each in wrong:
+        size = len(each.path)
+        inside = [other for other in causes if other.path[:size] == each.path]
+        if not any(other in found or len(other.path) > size for other in inside):
+            causes.append(each)
+    return causes
 
 
 def describe(study: Study) -> list[str]:

@@ -83,7 +83,8 @@ def _contender(
         motion = motion_of(table.motion, (*path, "motion"), motion, dims, mistakes)
     if world is not None and world.false_plots > 0 and table.gate is None:
         what = f"{dotted(path)} lacks a gate, and there are false plots"
-        mistakes.append(Mistake(path, what, "give gate = 16, a squared Mahalanobis distance"))
+        hint = "give gate = 16, a squared Mahalanobis distance"
+        mistakes.append(Mistake((*path, "gate"), what, hint, at_key=True))
     if found is None or motion is None or world is None or len(mistakes) > before:
         return None
     sensor = believed(world.sensor, table.noise_scale)
