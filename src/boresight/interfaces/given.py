@@ -13,7 +13,7 @@ from boresight.filters.recursion import Recursion
 from boresight.maths import Gaussian
 from boresight.models.checks import as_number
 from boresight.models.motion import Motion
-from boresight.models.sensors import Sensor
+from boresight.models.sensors import Radar, Sensor
 
 Array = Any
 
@@ -46,6 +46,28 @@ def plots(z: Any, sensor: Sensor) -> Array:
             next_step="give NaN where a component was not measured",
         )
     return array
+
+
+def recording(
+    given: Any, dt: Any, start: Any, gate: float | None, recursion: Recursion
+) -> tuple[Array, Array | None, Array]:
+    """Plots without air (runs, scans, k), candidates if there are any, and s before each scan.
+
+    Args:
+        given: what the user gave as plots.
+        dt: s before each scan; None: what the plots carry.
+        start: where to begin.
+        gate: what chooses from candidates.
+        recursion: what is to filter them.
+    """
+    sensor = recursion.sensor
+    many = candidates(given, gate, start, sensor)
+    z = plots(getattr(given, "z", given if many is None else many[:, :, 0]), sensor)
+    before = steps(getattr(given, "dt", None) if dt is None else dt, *z.shape[:2])
+    fit(recursion, *z.shape[:2])
+    if isinstance(sensor, Radar):
+        z, many = sensor.without_air(z), many if many is None else sensor.without_air(many)
+    return z, many, before
 
 
 def candidates(given: Any, gate: float | None, start: Any, sensor: Sensor) -> Array | None:

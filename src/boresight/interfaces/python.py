@@ -22,7 +22,7 @@ from boresight.maths.frames import Site
 from boresight.models.atmosphere import Atmosphere
 from boresight.models.checks import positive
 from boresight.models.motion import Motion
-from boresight.models.sensors import Radar, Sensor
+from boresight.models.sensors import Sensor
 
 if TYPE_CHECKING:
     import polars as pl
@@ -69,8 +69,7 @@ def run(
             for radars' targets, 11 for a bank's contacts at sea.
         gate: squared Mahalanobis distance beyond which a plot is not taken; of several the nearest
             inside is. Left out: every plot is taken, and a scan may hold only one.
-        outputs: any of mean, cov, nis, dof, loglik, innovation, variance, status; of an `Outside`
-            there are mean and cov.
+        outputs: of mean, cov, nis, dof, loglik, innovation, variance, status; `Outside` has two.
         last: give outputs after the last scan only.
         threads: threads that share the runs; the result does not depend on it.
         settings: the filter's own, such as `mu="none"` for the MEKF.
@@ -80,19 +79,13 @@ def run(
         as the filter took it, 0 up to the scan of a start from plots.
 
     Raises:
-        UsageError: an unknown name or setting, shapes that do not fit, an infinite plot, time
-            that goes backwards.
+        UsageError: an unknown name or setting, shapes that do not fit, an infinite plot.
     """
     given.models(motion, sensor)
     chosen = catalogue.find(name)
     step = catalogue.lookup("ekf") if isinstance(chosen, Outside) else chosen
     recursion = step.with_settings(**settings).recursion(motion, sensor)
-    many = given.candidates(plots, gate, start, sensor)
-    z = given.plots(getattr(plots, "z", plots if many is None else many[:, :, 0]), sensor)
-    steps = given.steps(getattr(plots, "dt", None) if dt is None else dt, *z.shape[:2])
-    given.fit(recursion, *z.shape[:2])
-    if isinstance(sensor, Radar):
-        z, many = (each if each is None else sensor.without_air(each) for each in (z, many))
+    z, many, steps = given.recording(plots, dt, start, gate, recursion)
     prior = getattr(plots, "prior", None) if start is None else start
     if prior is None or isinstance(prior, str):
         prior, z, steps = _start_from_plots(prior or "one plot", z, steps, recursion, speed_mps)
