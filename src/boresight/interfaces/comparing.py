@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from boresight.errors import UsageError
 from boresight.interfaces import door, screens_study
 from boresight.interfaces.answers import Answer
 from boresight.interfaces.studies import prepared
@@ -28,6 +29,11 @@ def compare(
     """Run a study; with a folder, keep what is done, and write the tables and the report."""
     from boresight.laboratory.run import run_study
 
+    if how.get("resume") and not folder:
+        raise UsageError(
+            "--resume goes on with what a folder holds, and none is named",
+            next_step=f"boresight compare {file} --resume -o DIR",
+        )
     study = prepared(file, runs=runs, seed=seed)
     target = door.folder(folder) if folder else None
     with progress(f"Comparing, {study.name}", manner) as watch:

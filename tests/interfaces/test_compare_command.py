@@ -1,0 +1,229 @@
+"""`boresight compare` and `simulate`, `bs.compare`, the study's page, frames and notebook."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from html_page import Page, embedded, needs_chromium, running_browser
+
+import boresight as bs
+from boresight.errors import UsageError
+
+STUDIES = Path(__file__).parents[2] / "examples" / "studies"
+PAPER = STUDIES / "paper.toml"
+CONTRACT = {
+    *("filter", "settings", "runs", "position_rmse_m", "velocity_rmse_mps", "anees"),
+    *("anees_bounds", "pcrlb_m", "ratio_to_bound", "diverged", "ns_per_step"),
+}
+SWEPT = """
+name = "angles"
+runs = 60
+seed = 3
+scenario = "kashyap-set-2"
+[sensor]
+range.sigma = "30 m"
+azimuth.sigma = "1.5 deg"
+elevation.sigma = "1.5 deg"
+[[filter]]
+name = "ekf"
+[[filter]]
+name = "ekf"
+label = "believes too much"
+noise_scale = 0.5
+[sweep]
+"sensor.azimuth.sigma" = ["0.5 deg", "5 deg"]
+"""
+
+
+def boresight(*arguments):
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "boresight", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """A study of two settings and two filters, with all that the command writes."""
+    folder = tmp_path_factory.mktemp("compare")
+    (folder / "study.toml").write_text(SWEPT, encoding="utf-8")
+    done = boresight("compare", folder / "study.toml", "-o", folder / "out", "--json")
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_the_answer_has_what_its_contract_says(swept):
+    _, told = swept
+    assert told["seed"] == 3
+    assert len(told["cells"]) == 4
+    assert all(set(cell) >= CONTRACT for cell in told["cells"])
+    assert [cell["label"] for cell in told["cells"]] == ["ekf", "believes too much"] * 2
+    assert {cell["settings"]["sensor.azimuth.sigma"] for cell in told["cells"]} == {
+        "0.5 deg",
+        "5 deg",
+    }
+
+
+def test_a_filter_that_believes_half_the_noise_is_found_out(swept):
+    """Its ANEES is near 2: 30 bands away, so chance has no say."""
+    _, told = swept
+    doubted = [cell for cell in told["cells"] if cell["label"] == "believes too much"]
+    assert all(cell["anees"] > cell["anees_bounds"][1] for cell in doubted)
+
+
+def test_python_gives_the_numbers_of_the_command(swept):
+    folder, told = swept
+    result = bs.compare(folder / "study.toml")
+    assert result.digest == told["sha256"]
+    assert bs.compare(folder / "study.toml", seed=4).digest != told["sha256"]
+
+
+def test_the_tables_hold_every_cell_run_and_scan(swept):
+    folder, told = swept
+    cells, runs, scans = (
+        pl.read_parquet(folder / "out" / f"{n}.parquet") for n in ("cells", "runs", "scans")
+    )
+    assert (cells.height, runs.height) == (4, 4 * 60)
+    for i, (label, setting) in enumerate(
+        zip(cells["label"], cells["sensor.azimuth.sigma"], strict=True)
+    ):
+        mine = (pl.col("label") == label) & (pl.col("sensor.azimuth.sigma") == setting)
+        of_runs = runs.filter(mine)["position_rmse_m"].to_numpy()
+        of_scans = scans.filter(mine)["position_rmse_m"].to_numpy()
+        whole = told["cells"][i]["position_rmse_m"]
+        assert np.sqrt(np.mean(of_runs**2)) == pytest.approx(whole, rel=1e-12)
+        assert np.sqrt(np.mean(of_scans**2)) == pytest.approx(whole, rel=1e-12)
+    assert {"error_x_m", "bound_m", "claimed_m", "nees"} <= set(scans.columns)
+
+
+def test_the_page_is_sound_and_says_what_the_command_says(swept):
+    folder, told = swept
+    html = (folder / "out" / "report.html").read_text("utf-8")
+    page = Page(html)
+    assert not page.faults
+    assert len(page.ids) == len(set(page.ids))
+    facts = json.loads(embedded(html, "boresight-report"))
+    assert facts["digest"] == told["sha256"]
+    words = " ".join(page.text)
+    assert "believes too much" in words
+    assert "too sure" in words
+    assert all(f"s{i}-{name}" in page.ids for i in (0, 1) for name in ("rmse", "nees", "nis"))
+    assert {"sweep-rmse", "sweep-anees", "cost"} <= set(page.ids)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    yield from running_browser()
+
+
+@needs_chromium
+def test_every_chart_of_the_page_is_drawn(swept, browser):
+    folder, _ = swept
+    page = browser.new_page()
+    faults = []
+    page.on("pageerror", lambda fault: faults.append(str(fault)))
+    page.goto((folder / "out" / "report.html").as_uri())
+    page.wait_for_selector("html[data-drawn]", state="attached", timeout=60_000)
+    page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+    page.wait_for_function(
+        "() => [...document.querySelectorAll('.chart')].every(e => e.querySelector('.main-svg'))",
+        timeout=30_000,
+    )
+    assert not faults
+
+
+def test_the_screen_fits_80_columns_and_names_the_verdict(swept, monkeypatch):
+    folder, _ = swept
+    monkeypatch.setenv("COLUMNS", "80")
+    done = boresight("compare", folder / "study.toml")
+    assert done.returncode == 0, done.stderr
+    assert "…" not in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert "too sure" in done.stdout
+
+
+def test_a_notebook_shows_the_ranking_and_a_picture(swept):
+    folder, _ = swept
+    html = bs.compare(folder / "study.toml", runs=8)._repr_html_()
+    page = Page(html)
+    assert not page.faults
+    assert html.count("<svg") == 2
+    assert re.search(r"believes too much", " ".join(page.text))
+
+
+def test_filters_of_ones_own_compete(swept):
+    folder, _ = swept
+    mine = bs.Filter(name="mine", formula=own_update, summary="", paper="")
+    result = bs.compare(folder / "study.toml", filters=[mine, "mekf"], runs=8)
+    assert {cell.label for cell in result.cells} == {"ekf", "believes too much", "mine", "mekf"}
+    ekf, own = (
+        next(cell for cell in result.cells if cell.label == label) for label in ("ekf", "mine")
+    )
+    assert own.position_rmse_m.value == pytest.approx(ekf.position_rmse_m.value, rel=1e-9)
+
+
+def own_update(prior, z, components):
+    """A user's filter: the catalogue's EKF by another name."""
+    from boresight.filters import ekf
+
+    return ekf.update(prior, z, components)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--runs", "0"], 2, "runs"),
+        (["--engine", "dask"], 2, "scheduler"),
+        (["--engine", "dask", "--scheduler", "tcp://127.0.0.1:9"], 74, "tcp://127.0.0.1:9"),
+        (["--resume"], 2, "-o"),
+        (["--chunk", "0"], 2, "chunk"),
+    ],
+)
+def test_what_cannot_be_done_is_said_with_the_next_step(arguments, code, words):
+    done = boresight("compare", PAPER, *arguments)
+    assert done.returncode == code, done.stderr
+    assert done.stderr.startswith("error: ")
+    assert words in done.stderr
+    assert "next:" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_unknown_filter_is_named_with_the_nearest(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('scenario = "kashyap-set-2"\nfilter = ["ekff"]\n', encoding="utf-8")
+    done = boresight("compare", path)
+    assert done.returncode == 2
+    assert "ekff" in done.stderr
+    assert "'ekf'" in done.stderr
+    assert "line 2" in done.stderr or ":2" in done.stderr
+
+
+def test_a_study_that_is_not_there(tmp_path):
+    done = boresight("compare", tmp_path / "none.toml")
+    assert done.returncode == 66
+    assert "none.toml" in done.stderr
+
+
+def test_a_study_of_another_kind_is_refused():
+    with pytest.raises(UsageError):
+        bs.compare({"scenario": "kashyap-set-2", "filter": ["ekf"], "runs": 0})
+
+
+def test_simulate_writes_truth_and_plots(tmp_path):
+    done = boresight("simulate", PAPER, "--runs", 3, "-o", tmp_path, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert (told["runs"], told["seed"]) == (3, 0)
+    tables = [pl.read_parquet(path) for path in told["outputs"] if path.endswith(".parquet")]
+    assert all(table["run"].n_unique() == 3 for table in tables if "run" in table.columns)
+    truth, plots = bs.simulate("kashyap-set-2", runs=3, seed=0)
+    seen = next(table for table in tables if "range_m" in table.columns)
+    assert seen["range_m"].to_numpy() == pytest.approx(plots.z[..., 0].ravel(), rel=1e-12)
+    assert truth.states.shape[0] == 3
