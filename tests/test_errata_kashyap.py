@@ -187,7 +187,7 @@ def test_k13_the_bias_is_taken_off_the_converted_plot():
 
 def test_k10_unwrapped_differences_hurt_exactly_the_runs_that_cross_south():
     world = lookup("kashyap-set-2")
-    runs = 150
+    runs = 300  # some 8 of which cross; none would once in 3,000 seeds
     truth, plots = simulate(world, runs=runs, seed=10)
     sigmas = [30.0, np.radians(1.5), np.radians(1.5)]
     start = plots.prior.mean, np.broadcast_to(plots.prior.cov, (runs, 6, 6))
@@ -204,9 +204,11 @@ def test_k10_unwrapped_differences_hurt_exactly_the_runs_that_cross_south():
     package = filtered("mekf", world.motion, world.sensor, plots, settings={"mu": "printed"})
     assert np.allclose(package.mean, filters[True], rtol=1e-6, atol=1e-3)
     jumps = np.abs(np.diff(plots.z[..., AZIMUTH], axis=1)).max(axis=1) > np.pi
-    assert 2 <= jumps.sum() < runs / 2
-    assert np.array_equal(filters[True][~jumps], filters[False][~jumps])
-    assert np.all(error[False][jumps] > 1.2 * error[True][jumps])
+    hurt = np.any(filters[True] != filters[False], axis=(1, 2))
+    assert hurt.any()
+    assert np.all(jumps[hurt])  # a plot may also jump together with its prediction
+    assert np.all(error[False][hurt] > 1.2 * error[True][hurt])
+    assert np.sum(jumps & ~hurt) < np.sum(hurt)
 
 
 def test_k11_azimuth_takes_its_quadrant_from_both_coordinates():

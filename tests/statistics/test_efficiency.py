@@ -1,9 +1,13 @@
 """How close to the bound the filters come, and whether they know: acceptance 4.
 
 Fixed seeds. On Set 2 the standard error of the ratio is 0.0095 and that of the ANEES 0.007, so a
-filter at 1.00 leaves the bands of 0.04 and 0.05 once in 40,000 and less than once in 10^11 draws.
+filter at 1.00 leaves the bands of 0.04 and 0.05 once in 40,000 and less than once in 10^11 draws,
+but for runs beside the zenith: one EKF's run in 15,000 is lost there, so one seed in 75 would fail.
 On the 10 degree set, with 1,000 runs, they are 0.008 and 0.005; MEKF lies five and twelve of these
-inside. The median ratio between two orders of components has one of 0.0002.
+inside. There it is lost in one run of 4,000, within four degrees of the vertical axis, and such a
+run can move the ANEES of all by tenths: judged is that of the others, and how many are lost (more
+than 5 of 1,000 once in 10^6 seeds). The median ratio between two orders of components has one of
+0.0002.
 """
 
 from dataclasses import replace
@@ -12,12 +16,13 @@ import numpy as np
 import pytest
 
 from boresight.experiments.bounds import average_in_covariance, bound_per_trajectory
-from boresight.experiments.metrics import anees, anis, diverged, percent_fit_error, rmse
+from boresight.experiments.metrics import anees, anis, diverged, nees, percent_fit_error, rmse
 from boresight.experiments.montecarlo import filtered
 from boresight.experiments.scenario import lookup
 from boresight.experiments.simulate import simulate
 
 LATE = slice(20, None)
+LOST = 10.0  # NEES of a run, a state: errors three times what the filter claims
 
 
 class World:
@@ -35,6 +40,12 @@ class World:
         found = filtered(name, world.motion, world.sensor, self.plots, settings=settings)
         ratio = rmse(found, self.truth, scans=LATE) / self.bound
         return ratio, anees(found, self.truth, scans=LATE).value, found
+
+    def judge_the_rest(self, name, **settings):
+        """The ratio of all runs, the share that is lost, and the ANEES of the others."""
+        ratio, _, found = self.judge(name, **settings)
+        each = np.mean(nees(found, self.truth)[:, LATE], axis=1) / found.mean.shape[2]
+        return ratio, np.mean(each >= LOST), np.mean(each[each < LOST])
 
 
 @pytest.fixture(scope="module")
@@ -65,15 +76,16 @@ def test_at_ten_degrees_the_ekf_does_not_know_its_errors(wide):
 
 @pytest.mark.parametrize(("name", "settings"), [("mekf", {}), ("mekf-block", {})])
 def test_at_ten_degrees_the_mekf_does(wide, name, settings):
-    ratio, consistency, _ = wide.judge(name, **settings)
+    ratio, lost, consistency = wide.judge_the_rest(name, **settings)
     assert ratio <= 1.07
+    assert lost <= 0.005
     assert 0.9 <= consistency <= 1.15
 
 
 def test_at_ten_degrees_other_readings_of_mu_do_not(wide):
     """Why the default is `predicted`; `printed`, with K3, would pass too (erratum K4)."""
-    _, none, _ = wide.judge("mekf", mu="none")
-    _, second, _ = wide.judge("mekf", mu="second order")
+    *_, none = wide.judge_the_rest("mekf", mu="none")
+    *_, second = wide.judge_the_rest("mekf", mu="second order")
     assert none < 0.9
     assert second > 1.5
 

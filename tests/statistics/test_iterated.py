@@ -1,21 +1,22 @@
-"""The iterated EKF near the zenith: it fails, and so does any Gauss-Newton.
+"""The iterated EKF beside the vertical axis: it fails, and Gauss-Newton may fail for good.
 
-On Set 2 one run in a thousand passes within two degrees of the zenith. There an iterate comes to
-lie beside the vertical axis, where an azimuth seems to tell everything (its gradient grows as one
-over the distance from the axis), and the covariance taken at that iterate is far too small.
-Minimising the cost to its end does not help: the mode itself lies there.
+On Set 2 one run in a hundred passes within three degrees of the zenith or the nadir, and about one
+in a thousand is lost there (10 in 15,000). An iterate comes to lie beside the axis, where an
+azimuth seems to tell everything (its gradient grows as one over the distance from the axis), and
+the covariance taken at that iterate is far too small. Minimising the cost to its end helps in half
+of the runs that are lost; in the others, as in the one below, the mode itself lies there.
 """
 
 import numpy as np
 import pytest
 
-from boresight.experiments.metrics import anees, diverged, nees
+from boresight.experiments.metrics import DIVERGED, nees
 from boresight.experiments.montecarlo import filtered
 from boresight.experiments.scenario import lookup
 from boresight.experiments.simulate import simulate
 from oracles import textbook
 
-SEED, ZENITH_RUN, SCAN = 4, 191, 162
+SEED, ZENITH_RUN, SCAN = 3, 185, 260
 R = np.diag(np.square([30.0, np.radians(1.5), np.radians(1.5)]))
 LATE = slice(20, None)
 
@@ -81,8 +82,13 @@ def test_the_mode_itself_is_misleading(run):
 
 
 def test_elsewhere_it_is_consistent():
+    """Runs that keep three degrees from the axis; in 15 seeds the ANEES was 0.997 to 1.006."""
     world = lookup("kashyap-set-2")
     truth, plots = simulate(world, runs=1000, seed=3)
     found = filtered("iekf", world.motion, world.sensor, plots)
-    assert diverged(found, truth, scans=LATE) == 0.0
-    assert anees(found, truth, scans=LATE).value == pytest.approx(1.0, abs=0.02)
+    x, y, z = np.moveaxis(truth.states[..., :3], -1, 0)
+    far = np.min(np.arctan2(np.hypot(x, y), np.abs(z)), axis=1) > np.radians(3.0)
+    assert np.mean(far) > 0.95
+    squares = nees(found, truth)[far, LATE] / 6
+    assert np.max(np.mean(squares, axis=1)) < DIVERGED
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.02)

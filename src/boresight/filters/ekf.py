@@ -136,8 +136,8 @@ def update_iterated(
 
     [bell1993]. It fails, as the method does, when a target passes within a few degrees of the
     zenith: an iterate lands beside the vertical axis, where the gradient of azimuth grows without
-    bound, and the covariance taken there is far too small. Step halving does not help: the mode of
-    the posterior itself lies there.
+    bound, and the covariance taken there is far too small. Step halving helps in half of such runs:
+    in the others the mode of the posterior itself lies there.
 
     Args:
         prior: predicted mean (n,), cov (n, n).
