@@ -1,6 +1,7 @@
 """Scenarios from plain numbers, against geometry and laws that are worked out apart."""
 
 import pickle
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from boresight.errors import DataError, UsageError
 from boresight.experiments.scenario import Scenario
 from boresight.experiments.simulate import simulate
 from boresight.experiments.spreads import Annulus, Normal, Uniform
+from boresight.experiments.truth import Truth
 from boresight.experiments.worlds import random_draws, recorded, waypoints
 from boresight.maths.frames import Site, geodetic_from_enu
 from boresight.models.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Static
@@ -230,6 +232,22 @@ def test_a_recording_without_heights_or_of_one_instant_is_refused():
         seen_from(table, scans=24)
     with pytest.raises(DataError, match="no column 'latitude_deg'"):
         seen_from(table.drop("latitude_deg"))
+
+
+def test_an_aircraft_of_the_demonstration_flies_its_known_truth_by_its_adsb():
+    """Reports of 5 to 30 m: every scan lies within 60 m of where the aircraft really was."""
+    folder = resources.files("boresight.demo")
+    site = Site(latitude_deg=47.8125, longitude_deg=1.40625, height_m=180.0)
+    world = recorded(folder / "recording.ast", site, dt_s=4.0, sensor=RADAR, target="F00000")
+    knots = pl.read_parquet(folder / "truth.parquet").filter(pl.col("address") == "F00000")
+    begin, end = knots["time_s"].min(), knots["time_s"].max()
+    fine = np.arange(begin, end, 0.05)
+    real = Truth(knots).at(np.full(len(fine), knots["flight"][0]), fine)
+    place = real.position[:, [1, 0, 2]]
+    first = np.argmin(np.linalg.norm(place - world.path[0, :3], axis=1))
+    same = first + 80 * np.arange(world.scans)
+    assert world.scans > 100
+    assert np.linalg.norm(world.path[:, :3] - place[same], axis=1).max() < 60.0
 
 
 @pytest.mark.skipif(not TRAJECTORIES.exists(), reason="the shared trajectories are not here")
