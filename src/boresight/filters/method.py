@@ -30,9 +30,9 @@ class Filter:
 
     Attributes:
         name: what tables, files and the command line call it.
-        formula: what has the settings as keyword-only arguments: an update formula (prior, z,
-            components, **settings) -> Posterior, or a class of `Method`, for which (and for a
-            function that makes one) `predict` is None.
+        formula: what has the settings as keyword-only arguments: an update formula
+            `(prior, z, components, **settings) -> Posterior`, or a class of `Method`, for which
+            (and for a function that makes one) `predict` is None.
         summary: one line for lists.
         paper: key in papers.bib; empty where there is none.
         predict: the prediction that goes with an update formula.
@@ -100,7 +100,7 @@ class Outside:
 
     Attributes:
         name: what it is called.
-        function: (z, dt, start, motion, sensor) -> (mean, cov): plots (runs, scans, k) with NaN
+        function: `(z, dt, start, motion, sensor) -> (mean, cov)`: plots (runs, scans, k), NaN
             where missing, dt (1 or runs, scans) in s, a `Gaussian` (runs, n), (runs, n, n) to begin
             with, the believed models; to mean (runs, scans, n) and cov (runs, scans, n, n). What it
             is given it cannot write into.

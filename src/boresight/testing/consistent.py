@@ -1,8 +1,6 @@
 """Whether a filter knows its errors, as an assertion with a stated rate of false alarms.
 
-[barshalom2001] section 5.4. Differs from it: errors at neighbouring scans are alike, so no
-chi-square band is that of an average over runs and scans. The averages of runs are independent, and
-their mean lies about 1 as Student says.
+[barshalom2001] section 5.4; the bands are those of the laboratory's verdicts.
 """
 
 import numpy as np
@@ -11,9 +9,10 @@ from boresight.errors import UsageError
 from boresight.experiments.metrics import ALL, Consistency, anis, nees
 from boresight.experiments.simulate import Truth
 from boresight.filters.recursion import Estimate
+from boresight.laboratory.intervals import anees_band
 from boresight.testing.comparing import BrokenLawError
 
-FEWEST_RUNS = 20  # below, an average's own spread is not known well enough for its band
+FEWEST_RUNS = 10  # below, the spread between runs is not known well enough for a band
 
 
 def assert_consistent(
@@ -29,7 +28,7 @@ def assert_consistent(
     the estimate has `nis` and `dof`.
 
     Args:
-        estimate: of `run`, with at least 20 runs.
+        estimate: of `run`, with at least 10 runs.
         truth: what was estimated.
         scans: which scans; the first ones still show the start.
         false_alarm: probability with which a filter that is consistent is called otherwise.
@@ -39,7 +38,7 @@ def assert_consistent(
 
     Raises:
         BrokenLawError: an AssertionError; too sure of itself, or too modest.
-        UsageError: nothing that could be tested, or fewer than 20 runs.
+        UsageError: nothing that could be tested, or fewer than 10 runs.
     """
     has_nis = all(name in estimate.others for name in ("nis", "dof"))
     tests = (truth is not None) + has_nis
@@ -62,20 +61,17 @@ def assert_consistent(
 def _nees_over_runs(
     estimate: Estimate, truth: Truth, scans: slice, false_alarm: float
 ) -> Consistency:
-    """Average NEES per state, and the band about 1 from how much the runs' averages differ."""
-    from scipy.stats import t
-
-    runs = np.mean(nees(estimate, truth)[:, scans], axis=1) / truth.states.shape[2]
+    """Average NEES per state, and its band."""
+    states = truth.states.shape[2]
+    runs = np.mean(nees(estimate, truth)[:, scans], axis=1) / states
     if len(runs) < FEWEST_RUNS:
         raise UsageError(
             f"{len(runs)} runs tell too little of a filter's errors",
             next_step=f"simulate {FEWEST_RUNS} runs or more",
         )
-    if not np.all(np.isfinite(runs)):
-        return Consistency(float("inf"), 1.0, 1.0, float("inf"))
-    error = float(np.std(runs, ddof=1) / np.sqrt(len(runs)))
-    reach = float(t.ppf(1.0 - false_alarm / 2.0, len(runs) - 1)) * error
-    return Consistency(float(np.mean(runs)), 1.0 - reach, 1.0 + reach, error)
+    with np.errstate(invalid="ignore"):  # of runs that are not numbers
+        spread = float(np.std(runs, ddof=1) / np.sqrt(len(runs)))
+    return Consistency(float(np.mean(runs)), *anees_band(runs, states, false_alarm), spread)
 
 
 def _sentence(name: str, found: Consistency, false_alarm: float) -> str:
