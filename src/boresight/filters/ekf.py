@@ -134,8 +134,8 @@ def update_iterated(
 ) -> Posterior:
     """Gauss-Newton on the posterior: relinearised at each estimate, always from the prior.
 
-    [bell1993]. It fails, as the method does, when a target passes within a few degrees of the
-    zenith: an iterate lands beside the vertical axis, where the gradient of azimuth grows without
+    [bell1993]. It fails, as the method does, when a target passes within a few degrees of zenith or
+    nadir: an iterate lands beside the vertical axis, where the gradient of azimuth grows without
     bound, and the covariance taken there is far too small. Step halving helps in half of such runs:
     in the others the mode of the posterior itself lies there.
 
