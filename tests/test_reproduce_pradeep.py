@@ -249,8 +249,8 @@ def test_the_bias_of_the_range_is_told_for_every_last_course(claims, study):
     told = claims["PR-C7"]["ours"]
     assert list(told) == [f"last course {course}°" for course in ("270", "000", "090", "180")]
     usual, error = told["last course 090°"], study.tracked["MGEKF"].error[:, -1, 0]
-    assert usual["mean error of the range, m"] == pytest.approx(np.mean(error))
-    assert usual["bound of the range, m"] == pytest.approx(study.bound_sd[-1, 0])
+    assert usual["bias, m"] == pytest.approx(np.mean(error))
+    assert usual["bound, m"] == pytest.approx(study.bound_sd[-1, 0])
     assert "last course 180° is the best" in claims["PR-C7"]["assumption"]
 
 

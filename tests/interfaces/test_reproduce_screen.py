@@ -13,9 +13,14 @@ def claim(name, verdict="reproduces", **given):
             "verdict": verdict, "assumption": ""} | given  # fmt: skip
 
 
-def shown(*claims, width=100):
+def shown(*claims, width=100, papers=("paper",), runs=None):
     file = io.StringIO()
-    found = {"claims": list(claims), "seed": 7}
+    found = {
+        "claims": list(claims),
+        "seed": 7,
+        "runs": runs,
+        "assumed": {key: {} for key in papers},
+    }
     Console(file=file, width=width, color_system=None).print(
         Group(*reproduced("paper", found, width))
     )
@@ -61,11 +66,28 @@ def test_parts_are_told_where_they_are_not_alike():
     assert "  does not reproduce  bad" in lines
 
 
-def test_all_verdicts_are_counted_at_the_end():
+def test_verdicts_are_counted_first_and_listed_at_the_end():
     lines = shown(claim("P-1"), claim("P-2", "cannot be checked"), claim("P-3"))
-    assert lines[-3].split() == ["reproduces", "2", "P-1", "P-3"]
-    assert lines[-2].split() == ["cannot", "be", "checked", "1", "P-2"]
-    assert lines[-1].startswith("seed 7")
+    assert lines[0] == (
+        "paper, 3 rows: reproduces 2, in band 0, does not reproduce 0, cannot be checked 1"
+    )
+    assert lines[-4].split() == ["reproduces", "2", "P-1", "P-3"]
+    assert lines[-3].split() == ["cannot", "be", "checked", "1", "P-2"]
+    assert lines[-1].startswith("seed 7, as many runs as each claim needs; -o DIR")
+
+
+def test_of_all_papers_a_claim_is_a_line_and_a_paper_a_row_of_counts():
+    long = claim("BO-F1", published="many words " * 30)
+    lines = shown(
+        claim("AD-T1", where="Table 1", published=1.0), long, claim("BO-C1", "does not reproduce"),
+        papers=("aditya", "bordonaro"), runs=50, width=80,
+    )  # fmt: skip
+    assert line_with(lines, "AD-T1") == ["AD-T1", "✓", "reproduces", "Table", "1"]
+    assert line_with(lines, "BO-C1")[:5] == ["BO-C1", "✗", "does", "not", "reproduce"]
+    assert sum("many words" in line for line in lines) == 1
+    assert line_with(lines, "aditya")[1:] == ["1", "0", "0", "0"]
+    assert line_with(lines, "bordonaro")[1:] == ["1", "0", "1", "0"]
+    assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.parametrize("width", [60, 80, 100])

@@ -1,18 +1,20 @@
-"""What a person sees of a paper that was repeated: a block for each claim, then all verdicts."""
+"""What a person sees of papers that were repeated: how many verdicts, the claims, all verdicts.
+
+A paper's claims are a block each; those of all papers a line each, for the page has the rest.
+"""
 
 from collections.abc import Iterable, Mapping
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from boresight.interfaces.report.words import figure
+from boresight.interfaces.report.reproduce_rows import KINDS, LONG, value
 from boresight.interfaces.screens import text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-STYLES = {"reproduces": "green", "in band": "green", "does not reproduce": "red"}
-LONG = 4  # values of a list that are all shown
+STYLES = {"reproduces": "green", "in band": "cyan", "does not reproduce": "red"}
 DIGITS = 3  # of figures that stand beside each other
 _LABEL = 24  # characters that the names of rows need beside their figures
 _VERDICT = max(map(len, STYLES))
@@ -21,15 +23,62 @@ _VERDICT = max(map(len, STYLES))
 def reproduced(key: str, found: dict[str, Any], width: int) -> "list[RenderableType]":
     """The screen of `boresight reproduce`."""
     claims = found["claims"]
-    blocks = [part for each in claims for part in (*_claim(each, width), text(""))]
-    more = f"seed {found['seed']}; --json adds bands, assumptions and the parts of each claim"
+    several = len(found["assumed"]) > 1
+    body = _lines(claims) if several else [part for each in claims for part in _block(each, width)]
     return [
-        text(f"{key}: {len(claims)} claims", "bold"),
+        text(f"{key}, {len(claims)} rows: {_counts(claims)}", "bold"),
         text(""),
-        *blocks,
-        _verdicts(claims),
-        text(more, "dim"),
+        *body,
+        *([_by_paper(found)] if several else [_verdicts(claims)]),
+        text(""),
+        text(_more(found), "dim"),
     ]
+
+
+def _more(found: dict[str, Any]) -> str:
+    """Where the rest is."""
+    runs = f"{found['runs']} runs" if found["runs"] else "as many runs as each claim needs"
+    where = found.get("report") or "-o DIR writes a page with figures"
+    return f"seed {found['seed']}, {runs}; {where}; --json has all"
+
+
+def _counts(claims: list[dict[str, Any]]) -> str:
+    names = _by_verdict(claims)
+    return ", ".join(f"{verdict} {len(names.get(verdict, ()))}" for verdict in KINDS)
+
+
+def _lines(claims: list[dict[str, Any]]) -> "list[RenderableType]":
+    """A line for each claim, cut where the screen ends; a gap between papers."""
+    from rich.table import Table
+
+    tables: list[RenderableType] = []
+    for _, group in groupby(claims, key=lambda each: each["id"][:2]):
+        grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False, expand=True)
+        grid.add_column(no_wrap=True, width=max(len(each["id"]) for each in claims))
+        grid.add_column(no_wrap=True, width=_VERDICT + 2)
+        grid.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
+        for each in group:
+            said = f": {each['published']}" if isinstance(each["published"], str) else ""
+            verdict = f"{KINDS[each['verdict']][1]} {each['verdict']}"
+            style = STYLES.get(each["verdict"], "yellow")
+            grid.add_row(each["id"], text(verdict, style), text(each["where"] + said))
+        tables += [grid, text("")]
+    return tables
+
+
+def _by_paper(found: dict[str, Any]) -> "Table":
+    """How many verdicts of each kind each paper has."""
+    grid = _grid("", *KINDS)
+    for name in found["assumed"]:
+        mine = [each for each in found["claims"] if each["id"][:2] == name[:2].upper()]
+        names = _by_verdict(mine)
+        grid.add_row(name, *(str(len(names.get(verdict, ()))) for verdict in KINDS))
+    return grid
+
+
+def _block(each: dict[str, Any], width: int) -> "Iterable[RenderableType]":
+    yield from _claim(each, width)
+    yield text("")
 
 
 def _claim(each: dict[str, Any], width: int) -> "Iterable[RenderableType]":
@@ -77,14 +126,14 @@ def _beside(
         columns = {"": ours}
     grid = _grid("", *columns, folds=True)
     for name in dict.fromkeys((*published, *ours)):
-        grid.add_row(name, *(_value(values[name]) if name in values else ""
+        grid.add_row(name, *(value(values[name]) if name in values else ""
                              for values in columns.values()))  # fmt: skip
     return grid
 
 
 def _rows(heads: tuple[str, ...], rows: list[tuple[str, Mapping[str, Any]]], width: int) -> "Table":
     """A column for each name, or a row where these are too wide, or a line of all each."""
-    lines = [(name, *(_value(value, DIGITS) for value in row.values())) for name, row in rows]
+    lines = [(name, *(value(each, DIGITS) for each in row.values())) for name, row in rows]
     upright: list[tuple[str, ...]] = [("", *heads), *lines]
     lying = list(zip(*upright, strict=True))
     for table, columns in ((upright, lying), (lying, upright)):
@@ -132,19 +181,3 @@ def _by_verdict(claims: Iterable[dict[str, Any]]) -> dict[str, list[str]]:
     for each in claims:
         found.setdefault(each["verdict"], []).append(each["id"])
     return found
-
-
-def _value(value: Any, digits: int = 4) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, (int, float)):
-        return figure(value, digits)
-    if isinstance(value, (list, tuple)):
-        if len(value) > LONG:
-            return f"{_value(value[0])}, {_value(value[1])}, ... {_value(value[-1])}"
-        if isinstance(value, tuple) and len(value) == 2:
-            return " to ".join(map(_value, value))
-        return ", ".join(map(_value, value))
-    if isinstance(value, Mapping):
-        return ", ".join(f"{name} {_value(each)}" for name, each in value.items())
-    return "–" if value is None else str(value)

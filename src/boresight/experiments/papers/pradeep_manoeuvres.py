@@ -44,7 +44,9 @@ def other_manoeuvres(study: Study) -> Claim:
         ours={course: _told(one, shift[course]) for course, one in found.items()},
         verdict=together([each.verdict for each in parts]),
         assumption=f"{_FILTER}, {study.runs} runs, the same noise for each last course of own "
-        f"ship, at {study.time_s[-1]:g} s. By Fisher information {informed} is the best of them; "
+        f"ship, at {study.time_s[-1]:g} s: mean error of the range and its standard error, RMS "
+        "error of the position, Cramér-Rao bound of the range. By Fisher information "
+        f"{informed} is the best of them; "
         + reasons(study, "last_turn_rates_degps", "altered_m"),
         parts=parts,
     )
@@ -78,10 +80,10 @@ def _heard(study: Study, table: dict[str, Any]) -> _Heard:
 
 def _told(one: _Heard, shift: Bias) -> dict[str, float | None]:
     return {
-        "mean error of the range, m": number(shift.value),
-        "its standard error, m": number(shift.standard_error),
-        "RMS error of the position, m": number(np.sqrt(np.mean(one.square))),
-        "bound of the range, m": one.bound_m,
+        "bias, m": number(shift.value),
+        "±, m": number(shift.standard_error),
+        "RMSE, m": number(np.sqrt(np.mean(one.square))),
+        "bound, m": one.bound_m,
     }
 
 
