@@ -16,6 +16,8 @@ from boresight.experiments.simulate import simulate
 from boresight.filters.method import Outside
 from boresight.laboratory.comparing import ranking
 from boresight.laboratory.intervals import anees_band, mean_interval, ratio_interval, rms_interval
+from boresight.laboratory.result import Interval
+from boresight.laboratory.sentences import verdicts
 from boresight.laboratory.study import METRICS, Contender, Limits
 from boresight.laboratory.summary import summarise
 
@@ -113,6 +115,7 @@ def test_groups_of_runs_tell_what_runs_tell():
     assert found.low == pytest.approx(found.value - half, abs=0.15 * half)
     assert found.high == pytest.approx(found.value + half, abs=0.15 * half)
     assert rms_interval(values, 0.05) == pytest.approx(np.sqrt(found))
+    assert mean_interval(np.ones(1023), 0.05) == (1.0, 1.0, 1.0)  # the last group is smaller
 
 
 @pytest.mark.parametrize("runs", [1, 2, 9])
@@ -191,6 +194,16 @@ def test_wrong_beliefs_are_said_in_words():
         assert said in " ".join(cell.verdicts)
     wins = {(c.better, c.other) for c in result.comparisons if c.is_win}
     assert {("1", "0"), ("1", "2")} <= wins
+
+
+def test_the_band_is_what_decides_the_words(same):
+    cell, low, high = same[0], 0.9, 1.2
+    for value, said in ((0.89, "too modest"), (1.19, "knows its errors"), (1.21, "too sure")):
+        told = replace(cell, anees=Interval(value, value, value), anees_bounds=(low, high))
+        words = [each for each in verdicts(study_of(world(MILD)), told) if "ANEES" in each]
+        assert len(words) == 1
+        assert said in words[0]
+        assert f"ANEES {value:.3f}, a consistent filter lies within 0.900 to 1.200" in words[0]
 
 
 def test_a_bias_of_the_sensor_is_found_and_none_where_there_is_none():

@@ -214,7 +214,8 @@ def test_dynamics_are_averaged_too():
     """J' = D22 - D21 (J + D11)^-1 D12 with expectations over trajectories (tichavsky1998, 21)."""
     world = lookup("aditya")
     motion = replace(world.motion, position_noise=0.05, velocity_noise=0.02)
-    truth, _ = simulate(replace(world, motion=motion, scans=5), runs=40, seed=3)
+    scattered = replace(world, motion=motion, scans=5, draw=anywhere)
+    truth, _ = simulate(scattered, runs=40, seed=3)
     step = np.full((1, 5), world.dt_s)
     ours = bound_averaged(truth, world.prior, motion, world.sensor, dt=step, detection=0.0)
     W, J = np.linalg.inv(motion.noise(world.dt_s)), np.linalg.inv(world.prior_cov)
@@ -224,6 +225,11 @@ def test_dynamics_are_averaged_too():
         D11, D12 = np.mean(np.swapaxes(F, 1, 2) @ W @ F, axis=0), -np.mean(F, axis=0).T @ W
         J = W - D12.T @ np.linalg.solve(J + D11, D12)
         assert np.allclose(ours[k], np.linalg.inv(J), rtol=1e-6, atol=1e-9)
+
+
+def anywhere(normals):
+    """States between which the motion differs."""
+    return lookup("aditya").initial * (1.0 + 0.3 * normals)
 
 
 def slopes(f, x, step=1e-5):
