@@ -14,7 +14,7 @@ from boresight.experiments.sets import gospa, ospa
 from boresight.filters.ekf import update
 from boresight.filters.method import Filter, Outside
 from boresight.filters.recursion import run_recursion
-from boresight.laboratory import trial
+from boresight.laboratory import chunk
 from boresight.laboratory.study import METRICS, Contender, Limits, Setting, Study
 from boresight.laboratory.sums import Tree
 from boresight.laboratory.trial import run_chunk
@@ -99,7 +99,7 @@ def test_scores_are_the_metrics_of_the_same_runs(scenario, name):
 def test_in_one_kernel_or_in_three_the_scores_are_the_same(monkeypatch, name, begin):
     asked = cell(replace(SPACE, begin=begin, detection=0.8, bias={"range_m": 40.0}), name)
     fused = run_chunk(*asked, 0, RUNS)
-    monkeypatch.setattr(trial._Chunk, "fused", None)
+    monkeypatch.setattr(chunk.Chunk, "fused", None)
     apart = run_chunk(*asked, 0, RUNS)
     for one, other in (
         (fused.runs, apart.runs),
@@ -115,7 +115,7 @@ def test_in_one_kernel_or_in_three_the_scores_are_the_same(monkeypatch, name, be
 @pytest.mark.parametrize("size", [1, 7, 100])
 def test_a_run_and_a_sum_are_the_same_bits_in_every_chunk(monkeypatch, size, apart):
     if apart:
-        monkeypatch.setattr(trial._Chunk, "fused", None)
+        monkeypatch.setattr(chunk.Chunk, "fused", None)
     asked = cell(replace(SPACE, begin="one plot"))
     whole = run_chunk(*asked, 0, 40)
     tree = Tree()
@@ -129,13 +129,19 @@ def test_a_run_and_a_sum_are_the_same_bits_in_every_chunk(monkeypatch, size, apa
         assert np.array_equal(tree.total[name], values), name
 
 
-def test_batches_of_a_chunk_do_not_show(monkeypatch):
-    asked = cell()
+@pytest.mark.parametrize("apart", [False, True], ids=["fused", "apart"])
+def test_batches_and_stretches_of_a_chunk_do_not_show(monkeypatch, apart):
+    if apart:
+        monkeypatch.setattr(chunk.Chunk, "fused", None)
+    asked = cell(replace(SPACE, begin="two plots"))
     whole = run_chunk(*asked, 3, 70)
-    monkeypatch.setattr(trial._Chunk, "lanes", 16)
+    monkeypatch.setattr(chunk.Chunk, "lanes", 16)
+    monkeypatch.setattr(chunk.Chunk, "_room", 80)  # stretches of 5 scans
     cut = run_chunk(*asked, 3, 70)
-    assert np.array_equal(whole.runs["nees"], cut.runs["nees"])
-    assert np.array_equal(Tree(whole.nodes).total["error"], Tree(cut.nodes).total["error"])
+    for name, values in whole.runs.items():
+        assert np.array_equal(cut.runs[name], values), name
+    for name, values in Tree(whole.nodes).total.items():
+        assert np.array_equal(Tree(cut.nodes).total[name], values), name
 
 
 @pytest.mark.parametrize(("truth", "noise"), [("one", "each"), ("each", "one"), ("one", "one")])

@@ -31,14 +31,16 @@ class Batch:
     runs: Array
     counts: Array
 
-    def nodes(self, sums: Array, columns: dict[str, Leaf]) -> Iterator[Node]:
-        """The nodes, from sums over blocks (blocks, scans, size), column beside column."""
-        start, ends = 0, np.cumsum([leaf.size for leaf in columns.values()])[:-1]
-        for place in self.places:
-            total = paired(sums[start : start + _blocks(place)], 1)[0]
-            parts = np.split(total, ends, axis=1)
-            start += _blocks(place)
-            named = zip(columns.items(), parts, strict=True)
+    def totals(self, sums: Array) -> Array:
+        """Sums over blocks (blocks, scans, size) as sums over nodes (nodes, scans, size)."""
+        ends = np.cumsum([_blocks(place) for place in self.places])[:-1]
+        return np.stack([paired(part, 1)[0] for part in np.split(sums, ends)])
+
+    def nodes(self, totals: Array, columns: dict[str, Leaf]) -> Iterator[Node]:
+        """The nodes, of sums (nodes, scans, size) that hold column beside column."""
+        ends = np.cumsum([leaf.size for leaf in columns.values()])[:-1]
+        for place, total in zip(self.places, totals, strict=True):
+            named = zip(columns.items(), np.split(total, ends, axis=1), strict=True)
             yield Node(*place, {name: leaf.unpack(part) for (name, leaf), part in named})
 
 

@@ -30,6 +30,7 @@ from boresight.models.parameters import rate_of, structure
 
 Array = Any
 Inputs = Mapping[str, Any]
+TOLD = ("mean", "cov", "nis", "dof")  # what a filter says that is scored
 _SCORING = {
     "counts": (Scalar(), Rate.LANE),  # 1; or 0 for a lane that only fills its block
     "scan": (Scalar(), Rate.STEP),
@@ -144,6 +145,13 @@ def world_kernel(trial: Trial) -> Kernel:
             },
         )
     )
+
+
+def filter_kernel(trial: Trial) -> Kernel:
+    """The filter by itself, that says everything of every scan."""
+    rates = {name: rate for name, (_, rate, _) in trial.beliefs.items()}
+    rates |= {"dt": Rate.STEP, "z": Rate.EACH}
+    return trial.recursion.kernel(rates, dict.fromkeys(TOLD, Rate.EACH))
 
 
 @lru_cache(maxsize=64)
