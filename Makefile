@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp-test
 BENCH_STAMP := $(VENV)/.stamp-bench
 
-.PHONY: demo test test-slow check bench clean
+.PHONY: demo test test-slow check bench docs clean
 
 demo: $(STAMP)
 	$(BIN)/boresight demo
@@ -25,6 +25,10 @@ check: $(STAMP)
 bench: $(BENCH_STAMP)
 	$(BIN)/python bench/run_all.py
 
+# Every example is run, every warning is an error, nothing is fetched; begin at docs/_build/index.html.
+docs: $(STAMP)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build
+
 $(STAMP): pyproject.toml scripts/setup.sh
 	sh scripts/setup.sh "$(PYTHON)" "$(VENV)" test
 	@touch $@
@@ -34,4 +38,4 @@ $(BENCH_STAMP): $(STAMP)
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis boresight-demo
+	rm -rf docs/_build $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis boresight-demo
