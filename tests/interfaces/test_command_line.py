@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from boresight.interfaces import cli, pages
+from boresight.interfaces import cli, commands, pages
 
 ROOT = Path(__file__).parents[2]
 BARCELONA = ROOT / "../shared/data/barcelona-60nm/plots-cat048.ast"
@@ -68,7 +68,7 @@ def test_the_static_page_tells_what_the_command_line_knows():
         assert line in page
     for flag in cli.FLAGS:
         assert flag in pages.OPTIONS
-        assert flag in cli.EPILOGUE
+        assert flag in commands.EPILOGUE
     assert max(map(len, page.splitlines())) <= 80
 
 

@@ -1,7 +1,7 @@
 """The work of `boresight compare` and `boresight simulate`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from boresight.errors import UsageError
 from boresight.interfaces import door, screens_study
@@ -23,7 +23,7 @@ def compare(
     runs: int | None,
     seed: int | None,
     folder: Path | None,
-    engine: str,
+    engine: Literal["local", "threads", "processes", "dask"],
     **how: Any,
 ) -> Answer:
     """Run a study; with a folder, keep what is done, and write the tables and the report."""
