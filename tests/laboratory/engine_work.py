@@ -20,6 +20,10 @@ def whose(x):
     return x, os.getpid()
 
 
+def group(_x):
+    return os.getpgrp()
+
+
 def fragile(x):
     if x == 3:
         raise ValueError("three is wrong")
@@ -51,8 +55,16 @@ def odd(x):
     raise OddError("strange", x)
 
 
-def whose_folder(folder, x):
+def leaves_name(folder, x):
     """Leave the process's number in a folder."""
     (Path(folder) / str(os.getpid())).touch()
     time.sleep(0.05)
+    return x
+
+
+def ever_longer(folder, x):
+    """The same; after the first tasks each takes a minute."""
+    leaves_name(folder, x)
+    if x >= 2:
+        time.sleep(60.0)
     return x

@@ -47,14 +47,17 @@ def is_alive(pid):
 # one digest
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 100, None])
+CHUNKS = [pytest.param(1, marks=pytest.mark.slow), 7, pytest.param(100, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("chunk", [*CHUNKS, None])
 @pytest.mark.parametrize("engine", LOCAL)
 def test_digest_does_not_depend_on_engine_and_chunk(engine, chunk, one_thread):
     found = run_study(engine_study.make(), engine=engine, workers=2, chunk=chunk)
     assert found.digest == one_thread
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 100])
+@pytest.mark.parametrize("chunk", CHUNKS)
 def test_digest_is_the_same_on_a_cluster(chunk, dask, one_thread):
     found = run_study(engine_study.make(), engine="dask", scheduler=dask, chunk=chunk)
     assert found.digest == one_thread
@@ -74,8 +77,8 @@ def test_every_task_comes_back_with_its_result(engine):
 
 
 def test_cluster_brings_every_task_back(dask):
-    found = dict(choose("dask", scheduler=dask)(engine_work.square, range(500)))
-    assert found == {i: i * i for i in range(500)}
+    found = dict(choose("dask", scheduler=dask)(engine_work.square, range(100)))
+    assert found == {i: i * i for i in range(100)}
 
 
 @pytest.mark.parametrize("engine", LOCAL)
@@ -164,18 +167,25 @@ def test_a_script_without_a_guard_may_use_processes(tmp_path):
     assert (done.stdout, done.stderr) == ("204\n", "")
 
 
+def test_an_interrupt_of_the_terminal_does_not_reach_processes():
+    found = dict(choose("processes", workers=2)(engine_work.group, range(4)))
+    assert os.getpgrp() not in found.values()
+
+
 @pytest.mark.parametrize("how", ["closed", "killed"])
 def test_no_process_outlives_its_parent(how, tmp_path):
     if how == "closed":
         engine = choose("processes", workers=2)
-        results = engine(partial(engine_work.whose_folder, tmp_path), count())
+        results = engine(partial(engine_work.ever_longer, tmp_path), count())
         next(results)
+        begun = time.monotonic()
         results.close()
+        assert time.monotonic() - begun < 10.0  # and not the minute that a task takes by now
     else:
         code = (
             "from functools import partial; from itertools import count; import engine_work\n"
             "from boresight.laboratory.engines import choose\n"
-            f"work = partial(engine_work.whose_folder, {str(tmp_path)!r})\n"
+            f"work = partial(engine_work.leaves_name, {str(tmp_path)!r})\n"
             "for _ in choose('processes', workers=2)(work, count()): pass"
         )
         environment = os.environ | {"PYTHONPATH": clusters.HERE}
