@@ -209,7 +209,7 @@ def compare(
     resume: options.Resume = False,
     output: options.StudyFolder = None,
 ) -> Job:
-    """Compare filters over many runs of a study, with bounds and verdicts."""
+    """Compare filters over the runs of a study, with bounds and verdicts."""
     return partial(
         comparing.compare,
         study,

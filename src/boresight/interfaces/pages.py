@@ -14,7 +14,7 @@ COMMANDS = {
     "calibrate": "Find what is wrong with a radar, against GPS, ADS-B or downlink.",
     "track": "Turn a recording into tracks, tables and a report.",
     "tma": "From bearings and own ship's track to range, course and speed.",
-    "compare": "Compare filters over many runs of a study, with bounds and verdicts.",
+    "compare": "Compare filters over the runs of a study, with bounds and verdicts.",
     "simulate": "Write the truth and the plots of a study, as tables.",
     "demo": "Calibrate and track the built-in recording, against known truth.",
     "reproduce": "Repeat a paper's tables and claims, with a verdict for each.",
