@@ -25,9 +25,9 @@ check: $(STAMP)
 bench: $(BENCH_STAMP)
 	$(BIN)/python bench/run_all.py
 
-# Every example is run, every warning is an error, nothing is fetched; begin at docs/_build/index.html.
+# Every example is run, every warning is an error, nothing is fetched; begin at docs/_build/html/index.html.
 docs: $(STAMP)
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
 $(STAMP): pyproject.toml scripts/setup.sh
 	sh scripts/setup.sh "$(PYTHON)" "$(VENV)" test
