@@ -243,3 +243,34 @@ def test_the_bound_of_a_given_path_is_one_trajectory_and_says_what_it_assumes():
     assert "first trajectory" in remark
     assert "process noise of ConstantVelocity(accel_mps2=0.5" in remark
     assert result.cells[0].ratio_to_bound < 1.0  # it does not manoeuvre as is assumed
+
+
+def test_the_exact_posterior_is_told_where_there_is_one():
+    """A straight flight from one plot: a filter made for it is as good, a linear one is not.
+
+    Azimuths of 6 degrees bend what a plot tells; the interval of the ratio is one of 99 %.
+    """
+    straight = bs.ConstantVelocity(accel_mps2=0.0, dims=2)
+    radar = bs.Radar(range_m=20.0, azimuth_deg=6.0)
+    exact = replace(
+        world(radar, scans=15, begin="one plot", speed_mps=10.0),
+        motion=straight,
+        draw=spread_of_speeds,
+    )
+    each = [contender(name, radar, motion=straight) for name in ("line-of-sight", "cmkf")]
+    study = study_of(exact, *each, runs=120, metrics=("rmse", "exact posterior"))
+    result = summarise(study, gathered(study))
+    best, linear = (cell.extra for cell in result.cells)
+    assert best["ratio_to_exact"].value == pytest.approx(1.0, abs=0.002)
+    assert linear["ratio_to_exact"].low > 1.0
+    over = linear["final_rmse_m"] / linear["exact_final_m"]
+    assert linear["ratio_to_exact"].value == pytest.approx(over)
+    assert any("exact posterior" in remark for remark in result.remarks)
+    other = study_of(world(radar), contender("mekf", radar), runs=20, metrics=("exact posterior",))
+    without = summarise(other, gathered(other))
+    assert "exact_final_m" not in without.cells[0].extra
+    assert any("without process noise" in remark for remark in without.remarks)
+
+
+def spread_of_speeds(normals):
+    return np.array([9000.0, 1000.0, 0.0, 0.0]) + normals * [100.0, 100.0, 10.0, 10.0]

@@ -99,6 +99,13 @@ def _bias(cell: Cell, percent: str) -> Iterator[str]:
 
 def _further(cell: Cell, percent: str) -> Iterator[str]:
     found = cell.extra
+    if "ratio_to_exact" in found:
+        ratio: Interval = found["ratio_to_exact"]
+        yield (
+            f"has {ratio.value:.3f} times the error of the exact posterior at the last scan"
+            f"{_in(ratio, percent)}: {number(found['final_rmse_m'])} m on the runs where that has "
+            f"{number(found['exact_final_m'])} m."
+        )
     if "noncredibility_db" in found:
         yield (
             f"has a noncredibility index of {number(found['noncredibility_db'])} dB, where errors "

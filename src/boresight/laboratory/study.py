@@ -22,6 +22,7 @@ Metric = Literal[
     "nees",
     "nis",
     "bound",
+    "exact posterior",
     "noncredibility",
     "percent fit error",
     "rsspe",

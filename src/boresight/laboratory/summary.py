@@ -6,7 +6,7 @@ average is infinite, and the median of runs stands beside it.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from boresight.experiments.verdicts import share_interval
 from boresight.laboratory.bounding import Bound, bound_of, nothing
 from boresight.laboratory.comparing import compared
 from boresight.laboratory.credible import credibility_of
+from boresight.laboratory.exactly import UNASKED, Exactly, beside_exact, exact_of
 from boresight.laboratory.further import further
 from boresight.laboratory.intervals import (
     FEWEST,
@@ -41,39 +42,48 @@ def summarise(study: Study, gathered: Sequence[Gathered]) -> StudyResult:
         The result, but for its digest.
     """
     scores = dict(zip(study.cells, gathered, strict=True))
-    bounds = list(_bounds(study))
+    bests = list(_bests(study))
     cells = tuple(
-        _cell(study, place, of_cell, bounds[place[0]]) for place, of_cell in scores.items()
+        _cell(study, place, of_cell, bests[place[0]]) for place, of_cell in scores.items()
     )
     comparisons: list[Comparison] = []
     for setting in range(len(study.settings)):
         mine = [cell for cell in cells if cell.setting == setting]
         comparisons += compared(mine, study.false_alarm)
-    told = [words for bound in bounds for words in bound.remarks]
-    remarks = tuple(dict.fromkeys([*told, *_remarks(study)]))
+    told = [words for best in bests for words in (*best.bound.remarks, best.exactly.remark)]
+    remarks = tuple(dict.fromkeys(words for words in (*told, *_remarks(study)) if words))
     return StudyResult(
         study=study, cells=cells, comparisons=tuple(comparisons), digest="", remarks=remarks
     )
 
 
-def _bounds(study: Study) -> Iterator[Bound]:
+class _Best(NamedTuple):
+    """What the best filter could do in a world."""
+
+    bound: Bound
+    exactly: Exactly
+
+
+def _bests(study: Study) -> Iterator[_Best]:
     """One for each setting; those of one scenario share it."""
-    known: dict[int, Bound] = {}
-    for setting in study.settings:
-        scenario = setting.scenario
+    known: dict[int, _Best] = {}
+    for scenario in (setting.scenario for setting in study.settings):
         if id(scenario) not in known:
-            is_asked = "bound" in study.metrics
-            known[id(scenario)] = bound_of(study, scenario) if is_asked else nothing(scenario)
+            known[id(scenario)] = _Best(
+                bound_of(study, scenario) if "bound" in study.metrics else nothing(scenario),
+                exact_of(study, scenario) if "exact posterior" in study.metrics else UNASKED,
+            )
         yield known[id(scenario)]
 
 
-def _cell(study: Study, place: tuple[int, int], gathered: Gathered, bound: Bound) -> Cell:
-    setting = study.settings[place[0]]
+def _cell(study: Study, place: tuple[int, int], gathered: Gathered, best: _Best) -> Cell:
+    setting, bound = study.settings[place[0]], best.bound
     contender, scenario = setting.contenders[place[1]], setting.scenario
     runs, alarm = gathered.runs, study.false_alarm
     position = rms_interval(runs["position_sq_m2"], alarm)
     states = gathered.sums["error"].shape[1]
     extra = further(study, scenario, contender, gathered)
+    extra |= beside_exact(best.exactly, gathered, alarm)
     if "noncredibility" in study.metrics:
         extra |= credibility_of(study, setting, contender, gathered)
     if np.isfinite(bound.position_m):
