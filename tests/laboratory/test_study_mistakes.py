@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import boresight as bs
 from boresight.errors import DataError
 from boresight.interfaces.terminal import Manner, complain
 from boresight.laboratory.mistakes import StudyError
@@ -137,6 +138,9 @@ RANDOM = {"kind": "random", "range": ["1 km", "9 km"], "speed": "90 m/s", "scans
             "not a spread",
             "lower",
         ),
+        ({"scenario": GOOD["scenario"] | {"site": ["1 deg"]}}, "scenario.site", "too few", ""),
+        ({"scenario": GOOD["scenario"] | {"speed": []}}, "scenario.speed", "has 0 values", "1"),
+        ({"metrics": []}, "metrics", "has 0 values", "1"),
         ({"scenario": RANDOM | {"range": "9 km"}}, "scenario", "one distance", "80 km"),
         ({"scenario": RANDOM | {"north": "9 km"}}, "scenario", "where targets start", "north"),
         ({"scenario": RANDOM | {"speed": {"mean": "1 m/s"}}}, "scenario.speed", "spread", "sd"),
@@ -214,11 +218,30 @@ def test_each_mistake_is_told_where_it_is(changed, setting, what, hint):
     assert hint in told[0]["hint"]
 
 
+def test_a_users_filter_that_fails_is_told(monkeypatch):
+    from boresight import catalogue
+
+    def broken(prior, z, components):
+        raise LookupError(f"no such {type(prior)}: {len(z)}, {len(components)}")
+
+    known = {"theirs": bs.Filter(name="theirs", formula=broken)}
+    monkeypatch.setattr(catalogue, "find", known.get)
+    (told,) = mistakes_of(GOOD | {"filter": "theirs"}).details["mistakes"]
+    assert told["what"].startswith("theirs fails at its first step: LookupError: no such")
+
+
 def test_a_wrong_swept_value_is_told_in_the_sweep(tmp_path):
     text = 'scenario = "kashyap-set-2"\nfilter = "ekf"\n[sweep]\n'
     error = mistakes_of(f'{text}"sensor.range.sigma" = ["1 m", "2 deg", "-3 m"]\n', tmp_path)
     places = [(each.line, each.column) for each in error.told]
     assert places == [(4, 32), (4, 41)]
+
+
+def test_what_a_table_lacks_is_told_at_its_head(tmp_path):
+    text = 'filter = "ekf"\n\n  [scenario]\nkind = "waypoints"\nspeed = "1 m/s"\n'
+    (told,) = mistakes_of(text, tmp_path).details["mistakes"]
+    assert (told["line"], told["column"], told["what"]) == (3, 4, "scenario lacks points")
+    assert told["hint"] == 'give points = [["20 km", "-30 km"], ["20 km", "40 km"]]'
 
 
 def test_what_is_missing_altogether_has_no_line(tmp_path):

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ValidationError
+from pydantic.fields import FieldInfo
 
 from boresight.laboratory.mistakes import Mistake, dotted
 from boresight.laboratory.quantities import Kind
@@ -87,8 +88,9 @@ def _path(place: tuple[str | int, ...], raw: Any) -> Path:
 def _mend(raw: dict[str, Any], error: Any, path: Path, mended: set[Place]) -> None:
     """Put an example where a quantity is wrong or missing; else take out what is wrong."""
     place = error["loc"]
-    kind = _kind_at(place)
-    if kind is None or place in mended or error["type"] == "extra_forbidden":
+    kind = _kind(_fields(place))
+    is_element = error["type"] == "missing" and isinstance(place[-1], int)
+    if kind is None or is_element or place in mended or error["type"] == "extra_forbidden":
         _prune(raw, path)
         return
     mended.add(place)
@@ -116,10 +118,8 @@ def _mistake(error: Any, path: Path, raw: Any) -> Mistake:
     if kind == "extra_forbidden":
         known = [each for model in _models(place[:-1]) for each in model.model_fields]
         return Mistake(path, f"{name} is not a setting", near(str(path[-1]), known), at_key=True)
-    if kind == "missing":
-        quantity = _kind_at(place)
-        example = f'"{quantity.example}"' if quantity else '"..."'
-        hint = f"give {place[-1]} = {example}"
+    if kind == "missing" and isinstance(place[-1], str):
+        hint = f"give {place[-1]} = {json.dumps(_example(_fields(place)))}"
         return Mistake(path, f"{name} lacks {place[-1]}", hint, at_key=True)
     if kind == "union_tag_invalid":
         known = context["expected_tags"].replace("'", "").split(", ")
@@ -129,6 +129,10 @@ def _mistake(error: Any, path: Path, raw: Any) -> Mistake:
             near(context["tag"], known),
         )
     said = f"{name} = {shown(_at(raw, path))}"
+    if kind == "missing":
+        return Mistake(
+            path, f"{said} has too few values", f"give {json.dumps(_example(_fields(place)))}"
+        )
     if kind == "literal_error":
         known = [str(each) for each in _literals(context["expected"])]
         return Mistake(path, f"{said} is unknown", near(str(error["input"]), known))
@@ -183,11 +187,23 @@ def _inside(hint: Any) -> list[type[BaseModel]]:
     return [model for each in get_args(hint) for model in _inside(each)]
 
 
-def _kind_at(place: Place) -> Kind | None:
-    """The kind of quantity that belongs at a place of the file, or in a list there."""
+def _fields(place: Place) -> list[FieldInfo]:
+    """What the models say of a setting, or of the list in which the place is."""
     names = [part for part in place if not isinstance(part, int)]
     fields = [model.model_fields.get(names[-1]) for model in _models(tuple(names[:-1]))]
-    hints = [hint for each in fields if each for hint in (*each.metadata, each.annotation)]
+    return [field for field in fields if field]
+
+
+def _example(fields: list[FieldInfo]) -> Any:
+    """What a setting that is missing may be."""
+    told = [each for field in fields for each in field.examples or ()]
+    kind = _kind(fields)
+    return told[0] if told else kind.example if kind else "..."
+
+
+def _kind(fields: list[FieldInfo]) -> Kind | None:
+    """The kind of quantity that a setting is, or is a list of."""
+    hints = [hint for each in fields for hint in (*each.metadata, each.annotation)]
     return next((kind for hint in hints for kind in _kinds(hint)), None)
 
 

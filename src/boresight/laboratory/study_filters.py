@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from boresight import catalogue
-from boresight.errors import UsageError
+from boresight.errors import BoresightError, UsageError
 from boresight.experiments.scenario import Scenario
 from boresight.experiments.simulate import begin
 from boresight.experiments.world import World
@@ -162,8 +162,17 @@ def _try(found: Filter, motion: Motion, sensor: Sensor, world: Scenario) -> bool
         )
     with np.errstate(all="ignore"):
         mean, cov = _begun(world, motion, sensor)
-        recursion = found.recursion(_first(motion, "motion"), _first(sensor, "sensor"))
-        state = recursion.begin(np.reshape(mean, (-1, n))[0], np.reshape(cov, (-1, n, n))[0])
-        inputs = {name: value for name, (value, _) in recursion.models().items()}
-        recursion.step(state, inputs | {"z": _exact(world), "dt": world.dt_s})
+        try:
+            recursion = found.recursion(_first(motion, "motion"), _first(sensor, "sensor"))
+            state = recursion.begin(np.reshape(mean, (-1, n))[0], np.reshape(cov, (-1, n, n))[0])
+            inputs = {name: value for name, (value, _) in recursion.models().items()}
+            recursion.step(state, inputs | {"z": _exact(world), "dt": world.dt_s})
+        except (BoresightError, ArithmeticError) as error:
+            if isinstance(error, BoresightError):  # floats may overflow where lanes carry on
+                raise
+        except Exception as error:  # a user's own filter may raise anything
+            raise UsageError(
+                f"{found.name} fails at its first step: {type(error).__name__}: {error}",
+                next_step="run it by itself: bs.run(...)",
+            ) from error
     return True

@@ -15,6 +15,7 @@ from boresight.experiments.spreads import Normal, Spread, Uniform
 from boresight.laboratory import quantities as q
 from boresight.laboratory.study import Draws, Metric
 
+_LEG = [["20 km", "-30 km"], ["20 km", "40 km"]]
 DEFAULT_RUNS = 1000
 LARGEST_SEED = 2**64 - 1
 
@@ -90,8 +91,10 @@ class MeasuredRate(Measured[Speed]):
 class CarrierTable(Table):
     """What carries a sensor: own ship, or an aircraft; as `waypoints` has it."""
 
-    points: Annotated[list[Point], Field(min_length=2)]
-    speed: Annotated[list[Annotated[Speed, Positive]], BeforeValidator(_as_list)]
+    points: Annotated[list[Point], Field(min_length=2, examples=[_LEG])]
+    speed: Annotated[
+        list[Annotated[Speed, Positive]], Field(min_length=1), BeforeValidator(_as_list)
+    ]
     lateral_accel: Annotated[Acceleration, Positive] | None = None
 
 
@@ -118,7 +121,7 @@ class PaperTable(Table):
     """A scenario of one of the papers."""
 
     kind: Literal["paper"] = "paper"
-    name: str
+    name: Annotated[str, Field(examples=["kashyap-set-2"])]
 
 
 class WaypointsTable(CarrierTable):
@@ -135,8 +138,8 @@ class RecordedTable(Table):
 
     kind: Literal["recorded"]
     name: str = "recorded"
-    file: str
-    site: Place
+    file: Annotated[str, Field(examples=["flight.csv"])]
+    site: Annotated[Place, Field(examples=[["47 deg", "8 deg", "400 m"]])]
     target: str | None = None
     scans: Annotated[int, AtLeastOne] | None = None
 
@@ -146,7 +149,7 @@ class RandomTable(Table):
 
     kind: Literal["random"]
     name: str = "random"
-    scans: Annotated[int, AtLeastOne]
+    scans: Annotated[int, Field(ge=1, examples=[60])]
     site: Place | None = None
     range: Annotated[Any, _spread(q.LENGTH)] = None
     azimuth: Annotated[Any, _spread(q.ANGLE)] = Uniform(0.0, 360.0)
@@ -201,7 +204,7 @@ class FilterTable(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True, strict=True, allow_inf_nan=False)
 
-    name: str
+    name: Annotated[str, Field(examples=["ekf"])]
     label: str | None = None
     motion: MotionTable | None = None
     noise_scale: Annotated[float, Positive] = 1.0
@@ -230,7 +233,7 @@ class StudyFile(Table):
     name: str | None = None
     runs: Annotated[int, AtLeastOne] = DEFAULT_RUNS
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
-    metrics: list[Metric] | None = None
+    metrics: Annotated[list[Metric], Field(min_length=1)] | None = None
     first_scan: Annotated[int, NotNegative] = 0
     false_alarm: Annotated[Share, Field(gt=0, lt=1)] | None = None
     scenario: AnyWorld | None = None

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
-from itertools import product
+from itertools import pairwise, product
 from math import prod
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from boresight.laboratory.study_models import FilterTable
 from boresight.laboratory.toml_places import Path
 
 _SWEPT = ("scenario", "sensor", "motion", "start", "filter")
-_MOST = 10_000  # settings: a table of more is no table
+_MOST = 1_000  # settings: a table of more is no table
 
 
 class Axis(NamedTuple):
@@ -143,13 +143,11 @@ def _targets(parts: Path, raw: dict[str, Any]) -> list[Path]:
 
 
 def _put(raw: dict[str, Any], path: Path, value: Any) -> None:
-    """Set what is at the path, tables made on the way."""
+    """Set what is at the path, tables made on the way; of lists there is that of filters."""
     inner: Any = raw
-    for part in path[:-1]:
-        if isinstance(inner, dict):
-            if not isinstance(inner.get(part), dict | list):
-                inner[part] = {}
-        elif not isinstance(inner[part], dict):
-            inner[part] = {}
-        inner = inner[part]
+    for part, following in pairwise(path):
+        found = inner.get(part) if isinstance(inner, dict) else inner[part]
+        if not isinstance(found, list if isinstance(following, int) else dict):
+            found = inner[part] = {}
+        inner = found
     inner[path[-1]] = value
