@@ -199,6 +199,8 @@ def test_verdicts_on_claims():
     assert of_share(0.05) == "does not reproduce"
     assert of_share(0.5) == "in band"
     assert of_share(0.95) == "reproduces"
+    assert of_share(0.0, 20) == of_share(0.04, 50) == "in band"  # 10 % may show none of 20
+    assert of_share(0.0, 50) == of_share(0.04, 400) == "does not reproduce"
     assert worst(["reproduces", "in band"]) == "in band"
     assert worst(["in band", "does not reproduce", "cannot be checked"]) == "does not reproduce"
 

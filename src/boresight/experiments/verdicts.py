@@ -4,7 +4,8 @@
                         a claim: true in at least 95 % of our runs
     in band             a number: inside the band, but the band is too wide to say more;
                         a claim: true in some runs and false in others
-    does not reproduce  a number: outside the band; a claim: true in at most 5 % of our runs
+    does not reproduce  a number: outside the band; a claim: true in at most 5 % of our runs, and
+                        of so many that 10 % would hardly have been missed
     cannot be checked   what it depends on is not printed
 
 A paper prints one run, or does not say how many; so the band is that of single runs, 5 to 95 %.
@@ -30,6 +31,7 @@ Array = Any
 Verdict = Literal["reproduces", "in band", "does not reproduce", "cannot be checked"]
 _BAND = (0.05, 0.95)
 _CLOSE = 0.05
+_NO_MORE = 0.10  # of runs: to call a claim false, more must be ruled out
 _SIGNIFICANT = 3.0  # standard errors
 _RANK: tuple[Verdict, ...] = ("does not reproduce", "cannot be checked", "in band", "reproduces")
 
@@ -127,11 +129,17 @@ def of_table(published: Mapping[str, float], ours: Mapping[str, Array]) -> tuple
     return words, "in band" if count >= needed else "does not reproduce"
 
 
-def of_share(share: float) -> Verdict:
-    """Verdict on a claim about one run, from the share of our runs in which it is true."""
+def of_share(share: float, runs: int | None = None) -> Verdict:
+    """Verdict on a claim about one run, from the share of our runs in which it is true.
+
+    Args:
+        share: of the runs.
+        runs: how many; a few cannot tell that a claim is false (95 % confidence). None for many.
+    """
     low, high = _BAND
     if share <= low:
-        return "does not reproduce"
+        most = share_interval(round(share * runs), runs, 2.0 * _BAND[0])[1] if runs else 0.0
+        return "does not reproduce" if most <= _NO_MORE else "in band"
     return "reproduces" if share >= high else "in band"
 
 

@@ -160,7 +160,7 @@ def _figures(table: dict[str, Any], sigma: Study, best: Study) -> list[Claim]:
             published=last["published"],
             ours={name: float(part) for name, part in by_state} | {"all six": share},
             band={"all six": interval},
-            verdict=of_share(share),
+            verdict=of_share(share, len(sigma.below)),
             assumption="share of runs in which the MEKF's error is the smaller one, and its 95 % "
             f"confidence interval; {sigma.name}; the curves are not given as numbers",
         )
@@ -210,7 +210,7 @@ def _all_below(row: dict[str, Any], studies: list[Study], sigma: Study) -> Claim
         ours={one.name: one.all_six[0] for one in studies}
         | {f"{sigma.name}, each filter on its own noise": float(np.mean(np.all(apart, axis=1)))},
         band={one.name: one.all_six[1] for one in studies},
-        verdict=of_share(max(one.all_six[0] for one in studies)),
+        verdict=of_share(max(one.all_six[0] for one in studies), len(sigma.below)),
         assumption=f"share of {len(sigma.plots.z)} runs, both filters on the same plots, and its "
         "95 % confidence interval. The velocity errors of the two filters then differ by at most "
         f"{_velocity_gap(sigma):.2g} of themselves: differences as large as the printed ones take "

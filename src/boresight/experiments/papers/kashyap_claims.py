@@ -57,7 +57,7 @@ def _better(study: Study) -> Claim:
             pair = {m: one[f"{m}{suffix}"].pfe for m in study.pair}
             over = ratios(pair, "ecmkf", "emekf")
             shares = {key.split()[1]: share(value < 1.0)[0] for key, value in over.items()}
-            verdict = together([of_share(value) for value in shares.values()])
+            verdict = together([of_share(value, study.runs) for value in shares.values()])
             parts.append(part("KA-C1", f"{label}{suffix}", "EMEKF is better", shares, verdict, why))
             verdicts += [] if suffix else [verdict]
     return row(
@@ -94,7 +94,7 @@ def _similar(study: Study) -> Claim:
         "claims",
         "KA-C2",
         ours={f"share of runs, {name}": value for name, value in shares.items()},
-        verdict=together([of_share(value) for value in shares.values()]),
+        verdict=together([of_share(value, study.runs) for value in shares.values()]),
         assumption=f"{reasons(study, 'comparable')}. Not so in azimuth and elevation, in the "
         "paper's own Table 2 either: a diagonal R of Cartesian channels drops what good angles "
         "know across the line of sight",
@@ -121,7 +121,7 @@ def _below_debiased(study: Study) -> Claim:
             for other in ("cmkf-d-t", "cmkf-d-m")
             for channel, value in study.fourth[other].pfe.items()
         }
-        verdict = together([of_share(value) for value in shares.values()])
+        verdict = together([of_share(value, study.runs) for value in shares.values()])
         why = leak(study) if not suffix else "without the correction there is no gain"
         parts.append(part("KA-C3", f"ecmkf{suffix}", "ECMKF is better", shares, verdict, why))
     return row(

@@ -15,7 +15,6 @@ from boresight.experiments.papers.kashyap_words import comparable, leak, reasons
 from boresight.experiments.verdicts import (
     Claim,
     band_of,
-    of_share,
     part,
     together,
 )
@@ -54,13 +53,13 @@ def _well_within(study: Study, one: Tracked, axis: int) -> Array:
 def _within(study: Study, name: str, found: Mapping[str, Tracked]) -> Claim:
     """Figures 3(a) and 4(a)."""
     true = {method: _well_within(study, found[method], 0) for method in study.pair}
-    shares = {method: share(runs)[0] for method, runs in true.items()}
+    shares = {method: share(runs) for method, runs in true.items()}
     return row(
         study,
         "figures",
         name,
-        ours={f"share of runs, {method}": value for method, value in shares.items()},
-        verdict=together([of_share(value) for value in shares.values()]),
+        ours={f"share of runs, {method}": value for method, (value, _) in shares.items()},
+        verdict=together([verdict for _, verdict in shares.values()]),
         assumption=f"{reasons(study, 'well_within')}; {_BOUNDS}"
         + (_TOO_WIDE if study.reading.correction == "same epoch" else ""),
     )

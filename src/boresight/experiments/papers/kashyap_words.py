@@ -78,7 +78,7 @@ def ratios(found: Runs, over: str, *methods: str) -> dict[str, Array]:
 def share(true: Array) -> tuple[float, Verdict]:
     """Of runs in which a sentence is true, and the verdict on it."""
     found = float(np.mean(true))
-    return found, of_share(found)
+    return found, of_share(found, np.size(true))
 
 
 def comparable(study: Study, ratio: Array) -> Array:

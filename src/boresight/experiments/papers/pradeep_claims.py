@@ -179,7 +179,7 @@ def _without(study: Study) -> Claim:
             f"mean weights at {study.before:g} s": now.tolist(),
             "mean weights at the end": end.tolist(),
         },
-        of_share(share),
+        of_share(share, study.runs),
         "own ship keeps its course to the end",
         share_interval(round(share * study.runs), study.runs),
     )
@@ -200,7 +200,7 @@ def _one_filter(study: Study) -> Claim:
             name,
             "in a run",
             share,
-            of_share(share),
+            of_share(share, study.runs),
             f"at {study.converge_s:g} s" if "right" in name else "by the end",
             share_interval(int(np.sum(found[name])), study.runs),
         )

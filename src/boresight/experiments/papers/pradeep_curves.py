@@ -46,7 +46,7 @@ def _track(study: Study, name: str, label: str) -> Claim:
         band={
             "share on the target at the end": share_interval(round(share * study.runs), study.runs)
         },
-        verdict=of_share(share),
+        verdict=of_share(share, study.runs),
         assumption="on the target: all four errors tolerated; the curves are not given as numbers; "
         "drawn: the run that converges at the median time",
     )
@@ -66,7 +66,9 @@ def _error(study: Study, name: str, quantity: str) -> Claim:
     told = (
         part(name, "reduced", "at the end", "", said(falls)),
         part(name, "gradually", "no rise", rise, said(max(rise.values()) <= study.assumed["rise"])),
-        part(name, "then converged", "in a run", shares, of_share(min(shares.values()))),
+        part(
+            name, "then converged", "in a run", shares, of_share(min(shares.values()), study.runs)
+        ),
     )
     shown = curves | {f"bound, {unit}": study.bound_sd[:, i]}
     return row(

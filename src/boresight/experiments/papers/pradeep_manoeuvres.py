@@ -46,8 +46,7 @@ def other_manoeuvres(study: Study) -> Claim:
         assumption=f"{_FILTER}, {study.runs} runs, the same noise for each last course of own "
         f"ship, at {study.time_s[-1]:g} s: mean error of the range and its standard error, RMS "
         "error of the position, Cramér-Rao bound of the range. By Fisher information "
-        f"{informed} is the best of them; "
-        + reasons(study, "last_turn_rates_degps", "altered_m"),
+        f"{informed} is the best of them; " + reasons(study, "last_turn_rates_degps", "altered_m"),
         parts=parts,
     )
 

@@ -67,7 +67,7 @@ def _straight(study: Study) -> Claim:
             "RMS error of the range, m": by_time(study, rms(one.error[..., 0])),
         },
         band={"share that converges": share_interval(round(share * study.runs), study.runs)},
-        verdict=of_share(1.0 - share),
+        verdict=of_share(1.0 - share, study.runs),
         assumption=f"{study.runs} runs in which own ship never turns: what is claimed of the range "
         "is what the starts of cells and velocities say; "
         + reasons(study, *_open(study, "PR-S02")),
