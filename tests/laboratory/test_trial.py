@@ -17,8 +17,9 @@ from boresight.filters.recursion import run_recursion
 from boresight.laboratory import chunk
 from boresight.laboratory.study import METRICS, Contender, Limits, Setting, Study
 from boresight.laboratory.sums import Tree
-from boresight.laboratory.trial import run_chunk
-from boresight.lanes import select
+from boresight.laboratory.trial import run_chunk, trial_of
+from boresight.laboratory.trial_kernels import fused_kernel
+from boresight.lanes import program, select
 from boresight.maths import Gaussian
 from boresight.models.motion import ConstantAcceleration, ConstantVelocity
 from boresight.models.sensors import Radar
@@ -109,6 +110,15 @@ def test_in_one_kernel_or_in_three_the_scores_are_the_same(monkeypatch, name, be
         for key in one:
             size = np.max(np.abs(other[key][np.isfinite(other[key])]), initial=0.0)
             np.testing.assert_allclose(one[key], other[key], rtol=1e-9, atol=1e-9 * size)
+
+
+def test_what_is_too_large_for_one_kernel_runs_in_three(monkeypatch):
+    asked = cell(SPACE)
+    whole = chunk.Chunk(*asked, trial_of(*asked)).fused.program.operations
+    fused_kernel.cache_clear()
+    monkeypatch.setattr(program, "LARGEST", whole - 1)
+    assert chunk.Chunk(*asked, trial_of(*asked)).fused is None
+    assert_same(run_chunk(*asked, 0, RUNS), *measured(SPACE, "ekf"))
 
 
 @pytest.mark.parametrize("apart", [False, True], ids=["fused", "apart"])
