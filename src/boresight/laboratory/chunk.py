@@ -149,15 +149,16 @@ class Chunk:
             "dt": np.where(taken, scene.dt[0], 0.0),  # a start from plots is where the last is
         }
 
-    def _during(self, values: Values, part: slice) -> Values:
-        """The inputs of a stretch of scans."""
+    @cached_property
+    def _rates(self) -> dict[str, Rate]:
+        """How often inputs of kernels change."""
         world = {name: rate for name, (_, rate) in self.trial.world.inputs.items()}
         beliefs = {name: rate for name, (_, rate, _) in self.trial.beliefs.items()}
-        rates = world | beliefs | dict.fromkeys(self._scans, Rate.STEP)
-        return {
-            name: value[part] if rates.get(name) is Rate.STEP else value
-            for name, value in values.items()
-        }
+        return world | beliefs | dict.fromkeys(self._scans, Rate.STEP) | {"counts": Rate.LANE}
+
+    def _during(self, values: Values, part: slice) -> Values:
+        """The inputs of a stretch of scans."""
+        return {n: v[part] if self._rates[n] is Rate.STEP else v for n, v in values.items()}
 
     def _start(self, batch: Batch, values: Values, moving: States) -> Gaussian:
         """Where the contender begins on each lane."""

@@ -21,6 +21,7 @@ from boresight.laboratory.scores import Scores
 from boresight.laboratory.study import Contender, Setting, Study
 from boresight.laboratory.sums import Tree
 from boresight.laboratory.trial_kernels import Trial
+from boresight.maths.seeds import check
 
 Array = Any
 
@@ -42,9 +43,10 @@ def run_chunk(
 
     Raises:
         UsageError: the contender needs what the setting's sensor does not measure, or a gate; no
-            scan is scored.
+            scan is scored; a seed or runs out of range.
     """
     chunk = Chunk(study, setting, contender, trial_of(study, setting, contender))
+    check(study.seed, count, first)
     chunk.compile()
     begun, tree, runs = time.thread_time(), Tree(), []
     for batch in batches(first, count, chunk.lanes):
