@@ -65,7 +65,6 @@ napoleon_use_rtype = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 autodoc_class_signature = "mixed"
-autodoc_preserve_defaults = True
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:class", r"[a-z]+[a-z_0-9]*"),  # several attributes that share a line, read as types
