@@ -81,12 +81,20 @@ class Chunk:
     def _is_outside(self) -> bool:
         return isinstance(self.contender.filter, Outside)
 
-    def compile(self) -> None:
-        """Make the kernels, which takes once what a run must not seem to take."""
-        if self.fused is None:
-            score_kernel(self.trial)
+    @cached_property
+    def _world(self) -> Kernel:
+        return world_kernel(self.trial)
+
+    @cached_property
+    def _score(self) -> Kernel:
+        return score_kernel(self.trial)
+
+    def prepare(self) -> None:
+        """Make what is made once, which no run must seem to take."""
         if self.fused is None or self.setting.scenario.spent:
-            world_kernel(self.trial)
+            _ = self._world
+        if self.fused is None:
+            _ = self._score
 
     @cached_property
     def lanes(self) -> int:
@@ -115,7 +123,7 @@ class Chunk:
             totals.append(batch.totals(out["sums"]))
         kept = {name: lanes.kept[f"kept.{name}"][batch.counts] for name in score.layout}
         final_m, scored = out["final_m"][batch.counts], scans - self.study.first_scan
-        return np.concatenate(totals, axis=1), score.of_runs(kept, final_m, scans, scored)
+        return np.concatenate(totals, axis=1), score.of_runs(kept, final_m, scored)
 
     def begun(self, batch: Batch) -> tuple[Lanes, Values]:
         """Lanes before the first scan, and all inputs of kernels."""
@@ -167,7 +175,7 @@ class Chunk:
         own, normal = np.empty((lanes, 0, 0)), np.empty((lanes, n))
         if scene.spent:
             first = self._during(values, slice(scene.spent))
-            own = world_kernel(self.trial).run(moving, first, scene.spent)[1]["own"]
+            own = self._world.run(moving, first, scene.spent)[1]["own"]
         elif scene.begin == "random draw":
             normal = _drawn(study.noise, batch, partial(_starts, scene, study.seed))
         prior = begin(scene, believed, self.contender.sensor, own, normal)
@@ -181,15 +189,13 @@ class Chunk:
     def _apart(self, lanes: Lanes, values: Values) -> tuple[Lanes, dict[str, Array]]:
         """World, filter and score one after the other."""
         lanes, told = self.told(lanes, values)
-        kept, out = score_kernel(self.trial).run(
-            lanes.kept, {**values, **told}, len(values["scan"])
-        )
+        kept, out = self._score.run(lanes.kept, {**values, **told}, len(values["scan"]))
         return lanes._replace(kept=kept), out
 
     def told(self, lanes: Lanes, values: Values) -> tuple[Lanes, dict[str, Array]]:
         """World and filter: `truth` (lanes, scans, n), and what the filter says, by name."""
         scans = len(values["scan"])
-        world, scene = world_kernel(self.trial).run(lanes.world, values, scans)
+        world, scene = self._world.run(lanes.world, values, scans)
         if isinstance(self.contender.filter, Outside):
             models = self.contender.motion, self.contender.sensor
             said = self.contender.filter(scene["z"], values["dt"][None], lanes.filtered, *models)

@@ -158,13 +158,8 @@ class Score:
             squares |= {f"off_{name}": _or_infinite(off * off), f"all_{name}": channel * channel}
         return squares
 
-    def of_runs(
-        self, kept: Mapping[str, Array], final_m: Array, scans: int, scored: int
-    ) -> dict[str, Array]:
-        """Numbers of each run (runs,), from what was kept of it over `scored` of its scans.
-
-        `converged_scan` is infinite where the last scan was not near either.
-        """
+    def of_runs(self, kept: Mapping[str, Array], final_m: Array, scored: int) -> dict[str, Array]:
+        """Numbers of each run (runs,), from what was kept of it over `scored` scans."""
         means = {name: kept[name] / scored for name in (*MEANS, *self._set_distances)}
         found = means | {name: kept[name] for name in _SUMS} | {"final_m": final_m}
         if "percent fit error" in self.metrics:
@@ -173,8 +168,7 @@ class Score:
                     share = np.sqrt(kept[f"off_{name}"] / kept[f"all_{name}"])
                 found[f"fit_error_{name}"] = np.where(np.isfinite(share), 100.0 * share, np.inf)
         if "convergence" in self.metrics:
-            since = kept["converged_scan"]
-            found["converged_scan"] = np.where(since < scans, since, np.inf)
+            found["converged_scan"] = kept["converged_scan"]
         return found
 
 

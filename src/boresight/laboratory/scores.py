@@ -36,10 +36,10 @@ class Scores:
     state), `nis`, `dof` (sums over them); where an estimate is no number they are infinite.
     Always there, of each scan: `error` (scans, n), `position_sq_m2`, `distance_m`,
     `velocity_sq_m2ps2`, `nees` (per state), `nis`, `dof`, `claimed_m2` (the position variance that
-    the filter claims). Metrics add to the runs `fit_error_<channel>` (%), `converged_scan` (the
-    first from which the error stays small, infinite where none), `ospa_m`, `gospa_m`; to the scans
-    `error_outer` (scans, n, n), `ospa_m`, `gospa_m`, and in powers that add up to that of
-    `gospa_m` its parts `gospa_localisation`, `gospa_missed`, `gospa_false`.
+    the filter claims). Metrics add to the runs `fit_error_<channel>` (%) and `converged_scan` (the
+    first from which the error stays small; the number of scans where there is none); to the scans
+    `error_outer` (scans, n, n); to both `ospa_m`, `gospa_m`, and its parts `gospa_localisation`,
+    `gospa_missed` and `gospa_false`, as powers, which add up to that of `gospa_m`.
 
     Attributes:
         first, count: runs [first, first + count).

@@ -47,7 +47,7 @@ def run_chunk(
     """
     chunk = Chunk(study, setting, contender, trial_of(study, setting, contender))
     check(study.seed, count, first)
-    chunk.compile()
+    chunk.prepare()
     begun, tree, runs = time.thread_time(), Tree(), []
     for batch in batches(first, count, chunk.lanes):
         totals, of_runs = chunk.run(batch)
