@@ -21,6 +21,7 @@ SCRIPTS: dict[str, tuple[str, ...]] = {  # packages without which there is nothi
     "peers": ("filterpy", "stonesoup", "dynamax", "nrl-tracker"),
     "registration": (),
     "bearings_only": (),
+    "laboratory": ("dynamax",),
     "startup": (),
     "commands": ("pytest",),  # whose tests hold the bad files
     "asterix": ("aviconv-asterix", "libasterix"),
