@@ -69,10 +69,15 @@ def test_mixtures_are_at_the_best_possible(table, name, worst, of):
 
 
 def test_five_components_know_their_errors(table):
-    """The ANEES of drawn truths has a standard error of 0.018, the expected one of 0.002."""
+    """The ANEES of drawn truths has a standard error of 0.018, the expected one of 0.002.
+
+    Most of the former is the truths' own chance, in which the exact posterior shares: a draw that
+    has 1.06 of it there has it here too. What ours has more is 0.004 at most.
+    """
     found = rows(table, FIVE)
     assert found["expected_nees"].is_between(0.88, 1.05).all()
-    assert found["anees"].is_between(0.88, 1.05).all()
+    more = found["anees"] - rows(table, EXACT)["anees"]
+    assert more.is_between(-0.12, 0.05).all()
 
 
 @pytest.mark.parametrize("name", OTHERS)
