@@ -13,7 +13,8 @@ from boresight.laboratory.study import Study
 
 Array = Any
 _TRAJECTORIES = 1000
-_STEPS = 100_000  # of all trajectories together: what is stored of them stays below 100 MB
+_STEPS = 1_000_000  # of all trajectories together
+_BATCH = 100_000  # steps at a time: what is stored of them stays below 100 MB
 
 
 class Bound(NamedTuple):
@@ -43,42 +44,65 @@ def nothing(scenario: Scenario, *remarks: str) -> Bound:
 
 def bound_of(study: Study, scenario: Scenario) -> Bound:
     """Both bounds of a scenario; its own motion and sensor are known to whoever attains them."""
-    runs = min(study.runs, _TRAJECTORIES, max(1, _STEPS // scenario.scans))
-    is_one_truth = study.truth == "one" or scenario.path is not None
-    if is_one_truth and scenario.detection == 1.0 and not scenario.spent:
-        runs = 1  # nothing that a bound depends on differs between runs
-    truth, plots = simulate(
-        scenario,
-        runs=runs,
-        seed=study.seed,
-        truth_run=0 if study.truth == "one" else None,
-        noise_run=0 if study.noise == "one" else None,
-    )
     try:
-        return _bound(study, scenario, truth, plots)
+        return _bound(study, scenario)
     except (UsageError, np.linalg.LinAlgError) as error:
         return nothing(scenario, f"No Cramer-Rao bound of {scenario.name}: {error}.")
 
 
-def _bound(study: Study, scenario: Scenario, truth: Truth, plots: Plots) -> Bound:
-    at, scored = elements(truth.names, "position"), slice(study.first_scan, None)
-    each = bound_per_trajectory(truth, plots, scenario.motion, scenario.sensor)
-    variance = np.sum(each[:, :, at, at], axis=-1)
+def _bound(study: Study, scenario: Scenario) -> Bound:
+    runs, batch = _trajectories(study, scenario), max(1, _BATCH // scenario.scans)
+    scored, variances = slice(study.first_scan, None), []
+    for first in range(0, runs, batch):
+        truth, plots = _flown(study, scenario, first, min(batch, runs - first))
+        at = elements(truth.names, "position")
+        each = bound_per_trajectory(truth, plots, scenario.motion, scenario.sensor)
+        variances.append(np.sum(each[:, :, at, at], axis=-1))
+    variance = np.concatenate(variances)
     of_runs = np.mean(variance[:, scored], axis=1)
-    position, runs = float(np.sqrt(np.mean(of_runs))), len(of_runs)
+    position = float(np.sqrt(np.mean(of_runs)))
     spread = float(np.std(of_runs, ddof=1) / np.sqrt(runs)) if runs > 1 else np.nan
-    remarks = [_told(scenario, runs)]
+    information, remark = _information(study, scenario, min(batch, runs))
+    return Bound(
+        position,
+        spread / (2 * position) if position else np.nan,
+        information,
+        np.mean(variance, axis=0),
+        runs,
+        (_told(scenario, runs), remark),
+    )
+
+
+def _trajectories(study: Study, scenario: Scenario) -> int:
+    """How many are looked at: one, where nothing that a bound depends on differs between runs."""
+    is_one_truth = study.truth == "one" or scenario.path is not None
+    if is_one_truth and scenario.detection == 1.0 and not scenario.spent:
+        return 1
+    return min(study.runs, _TRAJECTORIES, max(1, _STEPS // scenario.scans))
+
+
+def _flown(study: Study, scenario: Scenario, first: int, runs: int) -> tuple[Truth, Plots]:
+    return simulate(
+        scenario,
+        runs=runs,
+        seed=study.seed,
+        first=first,
+        truth_run=0 if study.truth == "one" else None,
+        noise_run=0 if study.noise == "one" else None,
+    )
+
+
+def _information(study: Study, scenario: Scenario, runs: int) -> tuple[float, str]:
+    """The bound averaged in information over the first batch; or NaN, and why."""
+    truth, plots = _flown(study, scenario, 0, runs)
+    at, models = elements(truth.names, "position"), (scenario.motion, scenario.sensor)
+    detection = scenario.detection * (np.arange(scenario.scans) >= scenario.spent)
     try:
-        detection = scenario.detection * (np.arange(scenario.scans) >= scenario.spent)
-        models = scenario.motion, scenario.sensor
-        average = bound_averaged(truth, plots.prior, *models, dt=plots.dt, detection=detection)
-        traces = np.sum(average[scored, at, at], axis=-1)
-        information = float(np.sqrt(np.mean(traces)))
+        found = bound_averaged(truth, plots.prior, *models, dt=plots.dt, detection=detection)
     except UsageError as error:
-        information = np.nan
-        remarks.append(f"{scenario.name}: {error}.")
-    error_m = spread / (2 * position) if position else np.nan
-    return Bound(position, error_m, information, np.mean(variance, axis=0), runs, tuple(remarks))
+        return np.nan, f"{scenario.name}: {error}."
+    traces = np.sum(found[study.first_scan :, at, at], axis=-1)
+    return float(np.sqrt(np.mean(traces))), ""
 
 
 def _told(scenario: Scenario, runs: int) -> str:

@@ -34,10 +34,16 @@ def _error(cell: Cell, percent: str) -> str:
     words = f"has a position RMSE of {number(error.value)} m{_in(error, percent)}"
     if math.isfinite(cell.ratio_to_bound):
         words += f", {cell.ratio_to_bound:.3f} times the Cramer-Rao bound of "
-        words += f"{number(cell.pcrlb_m)} m"
+        words += f"{number(cell.pcrlb_m)} m{_give_or_take(cell)}"
     if error.high < cell.pcrlb_m:
         words += ": a bias or a start better than was assumed must help it"
     return f"{words}; it takes {number(cell.ns_per_step)} ns a step."
+
+
+def _give_or_take(cell: Cell) -> str:
+    """How uncertain the bound is, as it is that of some trajectories."""
+    error = cell.extra.get("pcrlb_standard_error_m", math.nan)
+    return f" (standard error {number(error)} m)" if math.isfinite(error) else ""
 
 
 def _lost(cell: Cell, percent: str) -> str:
