@@ -42,7 +42,9 @@ Filters = Annotated[
     ),
 ]
 Output = Annotated[Path, Parameter(alias="-o", help="Folder for report.html and the tables.")]
-Figures = Annotated[Path | None, Parameter(alias="-o", help="Folder for the figures and a page of all.")]
+Figures = Annotated[
+    Path | None, Parameter(alias="-o", help="Folder for the figures and a page of all.")
+]
 
 # Of target motion analysis.
 BearingsFile = Annotated[
