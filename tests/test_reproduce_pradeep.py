@@ -334,7 +334,8 @@ def test_figures_with_as_many_runs_as_assumed():
     assert len(anywhere.finite) == 2000
     assert anywhere.finite.all()
     assert np.mean(anywhere.lost[:, -1]) <= 0.005
-    assert not np.any(np.isfinite(study.straight.times[1]))
+    # Without a manoeuvre 7 of 3,000 runs are right by luck; of 300, 5 in one of 1,000 seeds.
+    assert np.sum(np.isfinite(study.straight.times[1])) < 5
 
 
 @pytest.mark.slow
