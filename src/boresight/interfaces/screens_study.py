@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from boresight.interfaces.report.study_words import (
+    CONSISTENT,
     beside,
     cells_of,
     consistency,
     ends,
-    is_doubtful,
     rmse,
     setting_name,
 )
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 WIDE = 110
 STYLES = {"consistent": "green", "too sure": "red", "too modest": "yellow", "no number": "red"}
-DETAILED = 4  # settings whose verdicts are printed in full; the report has them all
+DETAILED = 4  # settings whose doubts are printed; the report has them all
 
 
 def studied(result: "StudyResult", outputs: Sequence[str], width: int) -> "list[RenderableType]":
@@ -73,8 +73,6 @@ def _verdicts(result: "StudyResult", setting: int) -> "list[RenderableType]":
     """Who is ahead of whom, then what is to be said of each filter."""
     cells = cells_of(result, setting)
     said = beside(result, setting, cells[0].label)
-    lines = [text(f"{cells[0].label} is {said}." if said else "")] if said else []
-    for cell in cells:
-        style = "yellow" if is_doubtful(cell) else ""
-        lines += [text(words, style) for words in cell.verdicts]
-    return [*lines, text("")]
+    lines = [text(f"{cells[0].label} is {said}.")] if said else []
+    doubts = [text(words, "yellow") for cell in cells for words in cell.doubts]
+    return [*lines, *(doubts or [text(CONSISTENT, "green")]), text("")]

@@ -47,7 +47,7 @@ def bound_of(study: Study, scenario: Scenario) -> Bound:
     try:
         return _bound(study, scenario)
     except (UsageError, np.linalg.LinAlgError) as error:
-        return nothing(scenario, f"No Cramer-Rao bound of {scenario.name}: {error}.")
+        return nothing(scenario, f"No Cramér-Rao bound of {scenario.name}: {error}.")
 
 
 def _bound(study: Study, scenario: Scenario) -> Bound:
@@ -108,7 +108,7 @@ def _information(study: Study, scenario: Scenario, runs: int) -> tuple[float, st
 def _told(scenario: Scenario, runs: int) -> str:
     """On what the bound rests."""
     first = "trajectory" if runs == 1 else f"{runs:,} trajectories"
-    words = f"The Cramer-Rao bound of {scenario.name} is that of the first {first}"
+    words = f"The Cramér-Rao bound of {scenario.name} is that of the first {first}"
     if scenario.path is not None:
         words += (
             f"; the path is given, and the bound assumes the process noise of {scenario.motion!r}"

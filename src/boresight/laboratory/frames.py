@@ -49,7 +49,7 @@ def row_of(result: StudyResult, cell: Cell) -> dict[str, Any]:
     }
     for name, value in cell.extra.items():
         row |= _with_ends(name, value) if isinstance(value, Interval) else {name: value}
-    return row | {"verdicts": list(cell.verdicts)}
+    return row | {"verdicts": list(cell.verdicts), "doubts": list(cell.doubts)}
 
 
 def _with_ends(name: str, value: Interval) -> dict[str, float]:
@@ -68,7 +68,7 @@ def cells_frame(result: StudyResult) -> "pl.DataFrame":
         row |= {"anees_bound_low": low, "anees_bound_high": high}
         low, high = row.pop("anis_bounds")
         row |= {"anis_bound_low": low, "anis_bound_high": high}
-        row["verdicts"] = " ".join(row["verdicts"])
+        row |= {name: " ".join(row[name]) for name in ("verdicts", "doubts")}
         rows.append({k: str(v) for k, v in settings.items()} | _flat(row))
     return pl.DataFrame(rows, infer_schema_length=None)
 

@@ -23,7 +23,7 @@ _ONLY_SAID = {  # what changes no number of a run
     "Outside": {"summary"},
 }
 _TIMES = {"ns_per_step"}
-_WORDS = {"label", "values", "verdicts"}
+_WORDS = {"label", "values", "verdicts", "doubts"}
 
 
 def processor() -> str:

@@ -45,6 +45,7 @@ class Cell:
             scan, and `bound_m2` where there is one.
         per_run: by name, (runs,).
         verdicts: one sentence each.
+        doubts: those of them that speak against it.
     """
 
     setting: int
@@ -68,6 +69,7 @@ class Cell:
     per_scan: Mapping[str, Array]
     per_run: Mapping[str, Array]
     verdicts: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
 
 class Comparison(NamedTuple):

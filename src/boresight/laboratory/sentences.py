@@ -6,12 +6,29 @@ from collections.abc import Iterator
 from boresight.laboratory.result import Cell, Interval
 from boresight.laboratory.study import Study
 
+HELPED = "a bias or a start better than was assumed must help it"
+PATH = "the path is given, and is smoother than the process noise that the bound assumes"
+
 
 def verdicts(study: Study, cell: Cell) -> tuple[str, ...]:
     """Sentences on a cell: its error, its lost runs, whether it knows its errors, and the rest."""
     percent = f"{100 * (1 - study.false_alarm):g} %"
-    parts = [_error(cell, percent), _lost(cell, percent), _anees(cell, percent)]
+    parts = [_error(study, cell, percent), _lost(cell, percent), _anees(cell, percent)]
     parts += [_anis(cell, percent), *_bias(cell, percent), *_further(cell, percent)]
+    return tuple(f"{cell.label} {part}" for part in parts if part)
+
+
+def doubts(study: Study, cell: Cell) -> tuple[str, ...]:
+    """Those of the sentences that speak against a cell."""
+    percent = f"{100 * (1 - study.false_alarm):g} %"
+    low, high = cell.anees_bounds
+    parts = [
+        "" if math.isfinite(cell.position_rmse_m.value) else _error(study, cell, percent),
+        _lost(cell, percent) if cell.diverged.value else "",
+        "" if low <= cell.anees.value <= high else _anees(cell, percent),
+        _anis(cell, percent),
+        *_bias(cell, percent),
+    ]
     return tuple(f"{cell.label} {part}" for part in parts if part)
 
 
@@ -27,16 +44,17 @@ def _in(x: Interval, percent: str, unit: str = "") -> str:
     return f" ({percent} interval {number(x.low)} to {number(x.high)}{unit})"
 
 
-def _error(cell: Cell, percent: str) -> str:
+def _error(study: Study, cell: Cell, percent: str) -> str:
     error = cell.position_rmse_m
     if not math.isfinite(error.value):
         return "has an infinite position RMSE: in at least one run its estimate is not a number."
     words = f"has a position RMSE of {number(error.value)} m{_in(error, percent)}"
     if math.isfinite(cell.ratio_to_bound):
-        words += f", {cell.ratio_to_bound:.3f} times the Cramer-Rao bound of "
+        words += f", {cell.ratio_to_bound:.3f} times the Cramér-Rao bound of "
         words += f"{number(cell.pcrlb_m)} m{_give_or_take(cell)}"
     if error.high < cell.pcrlb_m:
-        words += ": a bias or a start better than was assumed must help it"
+        is_given = study.settings[cell.setting].scenario.path is not None
+        words += f": {PATH if is_given else HELPED}"
     return f"{words}; it takes {number(cell.ns_per_step)} ns a step."
 
 

@@ -25,7 +25,7 @@ from boresight.laboratory.intervals import (
 )
 from boresight.laboratory.result import Cell, Comparison, Interval, StudyResult
 from boresight.laboratory.scores import Gathered
-from boresight.laboratory.sentences import verdicts
+from boresight.laboratory.sentences import doubts, verdicts
 from boresight.laboratory.study import Study
 
 Array = Any
@@ -110,7 +110,7 @@ def _cell(study: Study, place: tuple[int, int], gathered: Gathered, best: _Best)
         per_run=gathered.runs,
         verdicts=(),
     )
-    return replace(cell, verdicts=verdicts(study, cell))
+    return replace(cell, verdicts=verdicts(study, cell), doubts=doubts(study, cell))
 
 
 def _innovations(runs: Mapping[str, Array], false_alarm: float) -> dict[str, Any]:

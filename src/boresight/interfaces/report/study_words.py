@@ -8,7 +8,7 @@ from boresight.interfaces.report.verdict import Sentence
 from boresight.interfaces.report.words import figure
 from boresight.laboratory.result import Cell, Comparison, Interval, StudyResult
 
-CONSISTENT = "Every filter knows its own errors: each ANEES is in its band, and no run diverged."
+CONSISTENT = "Every filter knows its own errors: ANEES and NIS are in their bands, no run diverged."
 
 
 def setting_name(values: Sequence[tuple[str, str]]) -> str:
@@ -94,13 +94,8 @@ def _of_setting(result: StudyResult, setting: int) -> Iterator[Sentence]:
     told = f"; it is {escape(said)}" if said else ""
     yield Sentence("good" if math.isfinite(first.position_rmse_m.value) else "attention",
                    f"{text}{told}.", "ranking")  # fmt: skip
-    doubtful = [cell for cell in (first, *others) if is_doubtful(cell)]
+    doubtful = [cell for cell in (first, *others) if cell.doubts]
     for cell in doubtful:
-        yield Sentence("attention", f"{head}{' '.join(map(escape, cell.verdicts))}", "consistency")
+        yield Sentence("attention", f"{head}{' '.join(map(escape, cell.doubts))}", "consistency")
     if not doubtful:
         yield Sentence("good", f"{head}{CONSISTENT}", "consistency")
-
-
-def is_doubtful(cell: Cell) -> bool:
-    """Whether a filter does not know its errors, or lost a run."""
-    return consistency(cell) != "consistent" or cell.diverged.value > 0
