@@ -171,7 +171,10 @@ def picture(costs: dict[str, dict[int, float]]) -> None:
         axis.loglog(n, n * other[name] * np.median(each), color="0.75", label="linear")
         axis.loglog(n, n * other[name] * each, "o", color="#0072B2", label="measured")
         fixed = "steps each" if name == "runs" else "runs"
-        axis.set(xlabel=f"{name} ({other[name]} {fixed})", title=f"{1e9 * np.median(each):.0f} ns")
+        axis.set(
+            xlabel=f"{name} ({other[name]} {fixed})",
+            title=f"{1e9 * np.median(each):.0f} ns a step and run",
+        )
         axis.grid(visible=True, color="0.92")
     axes[0].set_ylabel("CPU time, s")
     axes[0].legend(frameon=False)
