@@ -47,6 +47,7 @@ def _ranking(result: "StudyResult", setting: int, width: int) -> "RenderableType
     grid = table(setting_name(cells[0].values), *heads, f"{percent} band", "", "lost", "ns")
     grid.title = grid.title or None
     grid.columns[0].no_wrap = False  # a long label takes two lines, not the figures' place
+    grid.columns[0].overflow = "fold"
     for cell in cells:
         low, high = cell.anees_bounds
         words = consistency(cell)
