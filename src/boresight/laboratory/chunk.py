@@ -19,7 +19,7 @@ from boresight.experiments.simulate import begin, starts
 from boresight.filters.method import Outside
 from boresight.filters.recursion import spread
 from boresight.filters.start import SPEED_MPS, SPREADS
-from boresight.laboratory.batches import Batch
+from boresight.laboratory.batches import Batch, batches
 from boresight.laboratory.study import Contender, Draws, Setting, Study
 from boresight.laboratory.trial_kernels import (
     TOLD,
@@ -38,6 +38,7 @@ Array = Any
 Values = Mapping[str, Array]  # inputs of kernels
 _SUMS = 2**18  # numbers that a kernel writes at a time: 2 MiB
 _STORED = 2**21  # numbers that lie between kernels: 16 MiB
+_BEGUN: set[tuple[int, int]] = set()  # cells of this process whose lanes have begun before
 
 
 class Lanes(NamedTuple):
@@ -95,6 +96,10 @@ class Chunk:
             _ = self._world
         if self.fused is None:
             _ = self._score
+        place = id(self.setting), id(self.contender)
+        if place not in _BEGUN:
+            _BEGUN.add(place)
+            self.begun(next(batches(0, 1, self.lanes)))  # small kernels, and imports
 
     @cached_property
     def lanes(self) -> int:

@@ -21,7 +21,8 @@ from boresight.laboratory.trial import run_chunk
 
 # Steps of a chunk: some 0.1 s of a kernel; arrays of a filter outside, which holds them all.
 _STEPS, _STEPS_OUTSIDE = 1 << 20, 1 << 14
-_LEAST = 64
+# A chunk costs a millisecond by itself: with fewer steps it would show in a filter's time.
+_LEAST, _LEAST_STEPS = 64, 1 << 17
 
 
 class Chunk(NamedTuple):
@@ -117,7 +118,8 @@ def _usual(study: Study, cell: tuple[int, int], workers: int) -> int:
     is_outside = isinstance(setting.contenders[cell[1]].filter, Outside)
     fits = (_STEPS_OUTSIDE if is_outside else _STEPS) // setting.scenario.scans
     shared = study.runs * len(study.cells) // (4 * workers)
-    return max(_LEAST, 1 << (max(1, min(fits, shared)).bit_length() - 1))
+    least = _LEAST if is_outside else max(_LEAST, _LEAST_STEPS // setting.scenario.scans)
+    return 1 << (max(least, min(fits, shared)).bit_length() - 1)
 
 
 def _work(study: Study, task: Chunk) -> Scores:
