@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from boresight.interfaces.report.study_words import (
     CONSISTENT,
+    against,
     beside,
     cells_of,
     consistency,
@@ -75,5 +76,9 @@ def _verdicts(result: "StudyResult", setting: int) -> "list[RenderableType]":
     cells = cells_of(result, setting)
     said = beside(result, setting, cells[0].label)
     lines = [text(f"{cells[0].label} is {said}.")] if said else []
-    doubts = [text(words, "yellow") for cell in cells for words in cell.doubts]
+    doubts = [
+        text(f"{cell.label} {'; it '.join(against(cell))}.", "yellow")
+        for cell in cells
+        if cell.doubts
+    ]
     return [*lines, *(doubts or [text(CONSISTENT, "green")]), text("")]

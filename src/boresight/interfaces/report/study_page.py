@@ -77,7 +77,7 @@ def _evidence(
     result: StudyResult, setting: int, drawn: Sequence[Panel], alarm: str, *, several: bool
 ) -> str:
     """The charts of one setting; folded, all but the first, where there are several."""
-    inside = study_tables.verdicts(result, setting) + _pair(drawn, alarm)
+    inside = _pair(drawn, alarm) + study_tables.verdicts(result, setting)
     if not several:
         return inside
     name = escape(setting_name(result.study.settings[setting].values) or f"setting {setting + 1}")

@@ -79,7 +79,10 @@ def _verdict(cell: Cell) -> TableCell:
 def verdicts(result: StudyResult, setting: int) -> str:
     """Every sentence on the contenders of a setting, as a list."""
     said = [escape(words) for cell in cells_of(result, setting) for words in cell.verdicts]
-    return f"<ul>{''.join(f'<li>{words}</li>' for words in said)}</ul>" if said else ""
+    if not said:
+        return ""
+    items = "".join(f"<li>{words}</li>" for words in said)
+    return f"<details><summary>Every sentence on every filter</summary><ul>{items}</ul></details>"
 
 
 def comparisons(result: StudyResult) -> str:

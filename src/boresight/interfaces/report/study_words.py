@@ -96,6 +96,29 @@ def _of_setting(result: StudyResult, setting: int) -> Iterator[Sentence]:
                    f"{text}{told}.", "ranking")  # fmt: skip
     doubtful = [cell for cell in (first, *others) if cell.doubts]
     for cell in doubtful:
-        yield Sentence("attention", f"{head}{' '.join(map(escape, cell.doubts))}", "consistency")
+        said = f"<b>{escape(cell.label)}</b> {'; it '.join(against(cell))}."
+        yield Sentence("attention", f"{head}{said}", "consistency")
     if not doubtful:
         yield Sentence("good", f"{head}{CONSISTENT}", "consistency")
+
+
+def against(cell: Cell) -> list[str]:
+    """In a few words each, what a cell's doubts say: `diverged in 2 of 1,000 runs`."""
+    words, extra, (low, high) = consistency(cell), cell.extra, cell.anis_bounds
+    said = []
+    if words != "consistent":
+        factor = math.sqrt(max(cell.anees.value, 0.0))
+        said.append(
+            f"is {words}: its errors are {figure(factor, 3)} times its claims (ANEES "
+            f"{figure(cell.anees.value, 3)})"
+            if math.isfinite(factor)
+            else "does not know its errors: a covariance or an estimate is no number"
+        )
+    elif math.isfinite(cell.anis) and not low <= cell.anis <= high:
+        more = "more" if cell.anis > high else "less"
+        said.append(f"is surprised {more} than it expects: NIS {figure(cell.anis, 4)}")
+    if cell.diverged.value:
+        said.append(f"diverged in {round(cell.diverged.value * cell.runs):,} of {cell.runs:,} runs")
+    if extra.get("bias_limit", math.inf) < extra.get("bias_standard_errors", 0.0) < math.inf:
+        said.append(f"is biased: by {figure(extra['bias_m'], 3)} m at scan {extra['bias_scan']}")
+    return said or list(cell.doubts)
