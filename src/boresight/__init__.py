@@ -44,6 +44,8 @@ _WHERE = {
     "experiments.metrics": ["anees", "rmse"],
     "experiments.sets": ["gospa", "ospa"],
     "experiments.reproduce": ["reproduce"],
+    "experiments.worlds": ["random_draws", "recorded", "waypoints"],
+    "experiments.spreads": ["Annulus", "Normal", "Uniform"],
     "laboratory.study": ["Contender", "Limits", "Setting", "Study"],
     "interfaces.converting": ["convert"],
     "interfaces.error_models": ["error_model"],

@@ -14,6 +14,12 @@ from boresight.experiments.scenario import Scenario as Scenario
 from boresight.experiments.sets import gospa as gospa
 from boresight.experiments.sets import ospa as ospa
 from boresight.experiments.simulate import simulate as simulate
+from boresight.experiments.spreads import Annulus as Annulus
+from boresight.experiments.spreads import Normal as Normal
+from boresight.experiments.spreads import Uniform as Uniform
+from boresight.experiments.worlds import random_draws as random_draws
+from boresight.experiments.worlds import recorded as recorded
+from boresight.experiments.worlds import waypoints as waypoints
 from boresight.filters.method import Filter as Filter
 from boresight.filters.method import Outside as Outside
 from boresight.filters.own_doppler import track_range_rate as track_range_rate
