@@ -23,13 +23,14 @@ import faults_calibration
 import faults_filters
 import faults_registration
 import faults_tables
+import faults_testing
 import faults_tma
 from faults import Fault
 
 ROOT = Path(__file__).resolve().parents[1]
 _TABLES = (
     faults, faults_filters, faults_calibration, faults_registration, faults_tma, faults_bearings,
-    faults_tables,
+    faults_tables, faults_testing,
 )  # fmt: skip
 FAULTS = tuple(fault for table in _TABLES for fault in table.FAULTS)
 _JUDGED = {

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import boresight as bs
+from boresight.filters.kalman import predict
 from boresight.filters.steps import Updating
 from boresight.maths import gradient, mirror, missing, select
 
@@ -71,6 +72,19 @@ def crowd(z, dt, start, motion, sensor):
     return 0.99 * mean + 0.01 * mean.mean(axis=0), cov
 
 
+def overlapping(mean, cov):
+    """Positive variances, and a correlation of two."""
+    cov = cov + 0.0
+    cov[0, 1] = cov[1, 0] = 2.0 * np.sqrt(cov[0, 0] * cov[1, 1])
+    return mean, cov
+
+
+def pushing(prior, motion, dt):
+    """A prediction that moves what it was given."""
+    prior.mean[0] = prior.mean[0] + 1.0
+    return predict(prior, motion, dt)
+
+
 class Whispering:
     """A method that says it tells what it keeps, and tells something else."""
 
@@ -85,6 +99,10 @@ class Whispering:
         return told._replace(mean=told.mean * 1.001)
 
 
+FURTHER = (
+    ("covariance", faulty(after=overlapping)),
+    ("inputs", bs.Filter(name="faulty", formula=update, predict=pushing)),
+)
 BROKEN = {
     "kalman": faulty(gain_by=0.5),
     "order": faulty(later=1.0),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import boresight as bs
-from own_filters import BROKEN, FADING_EKF, NUMPY_EKF, update
+from own_filters import BROKEN, FADING_EKF, FURTHER, NUMPY_EKF, update
 
 RADAR = bs.Radar(range_m=30, azimuth_deg=0.1)
 MOTION = bs.ConstantVelocity(accel_mps2=2, dims=2)
@@ -31,10 +31,10 @@ def test_a_function_over_recordings_is_held_to_the_laws_that_need_no_steps():
     assert checked.laws == tuple(name for name in NAMES if name not in ("formula", "stream"))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_broken_filter_breaks(name):
+@pytest.mark.parametrize(("name", "broken"), [*BROKEN.items(), *FURTHER])
+def test_a_broken_filter_breaks(name, broken):
     with pytest.raises(AssertionError, match=f"^faulty breaks the law {name!r}") as caught:
-        bs.testing.check(BROKEN[name], law=name)
+        bs.testing.check(broken, law=name)
     assert re.search(r"\n  found:   .+\n  where:   .+, seed \d+\n", str(caught.value))
 
 

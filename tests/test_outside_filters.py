@@ -292,3 +292,34 @@ def test_the_example_is_installed_and_its_filters_are_names(tmp_path):
         ",".join(law.name for law in bs.testing.laws()),
         "positions in space,positions in the plane",
     ]
+
+
+STUDY = {
+    "scenario": {"kind": "paper", "name": "kashyap-set-4"},
+    "filter": [{"name": "ekf-sequential", "order": ["range_m", "azimuth_rad"]}],
+    "runs": 12,
+    "seed": 5,
+}
+
+
+def rmse_of(result):
+    return {cell.label: cell.position_rmse_m.value for cell in result.cells}
+
+
+def test_compare_takes_it():
+    found = rmse_of(bs.compare(STUDY, filters=[FADING_EKF, NUMPY_EKF]))
+    assert found["fading-ekf"] == pytest.approx(found["ekf-sequential"], rel=1e-6)
+    assert found["numpy-ekf"] == pytest.approx(found["ekf-sequential"], rel=1e-6)
+
+
+def test_a_study_names_what_a_package_offers(offer):
+    offer({"fading-ekf": "FADING_EKF"}, GOOD)
+    offer({"numpy-ekf": "NUMPY_EKF"}, (EXAMPLE / "numpy_ekf.py").read_text(encoding="utf-8"))
+    tables = [
+        {"name": "fading-ekf"},
+        {"name": "fading-ekf", "label": "faded", "fading": 1.2},
+        {"name": "numpy-ekf"},
+    ]
+    found = rmse_of(bs.compare(STUDY | {"filter": tables}))
+    assert found["fading-ekf"] == pytest.approx(found["numpy-ekf"], rel=1e-6)
+    assert found["faded"] > found["fading-ekf"]
