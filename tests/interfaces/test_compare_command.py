@@ -13,9 +13,12 @@ from html_page import Page, embedded, needs_chromium, running_browser
 
 import boresight as bs
 from boresight.errors import UsageError
+from boresight.interfaces.comparing import compare
+from boresight.interfaces.terminal import Manner
 
 STUDIES = Path(__file__).parents[2] / "examples" / "studies"
 PAPER = STUDIES / "paper.toml"
+TWO_LINES = {"scenario": "kashyap-set-2", "filter": ["ekf"]}
 CONTRACT = {
     *("filter", "settings", "runs", "position_rmse_m", "velocity_rmse_mps", "anees"),
     *("anees_bounds", "pcrlb_m", "ratio_to_bound", "diverged", "ns_per_step"),
@@ -211,9 +214,43 @@ def test_a_study_that_is_not_there(tmp_path):
     assert "none.toml" in done.stderr
 
 
-def test_a_study_of_another_kind_is_refused():
+@pytest.mark.parametrize(
+    ("study", "options"),
+    [
+        (TWO_LINES | {"runs": 0}, {}),
+        (3, {}),
+        (None, {}),
+        (TWO_LINES, {"filters": [3]}),
+        (TWO_LINES, {"filters": ["ekf", "ekf"]}),
+        (TWO_LINES, {"runs": 2.5}),
+        (TWO_LINES, {"runs": "many"}),
+        (TWO_LINES, {"runs": True}),
+        (TWO_LINES, {"runs": 10**13}),
+        (TWO_LINES, {"seed": 1.5}),
+        (TWO_LINES, {"workers": 1.5}),
+        (TWO_LINES, {"chunk": 2.5}),
+    ],
+)
+def test_a_study_of_another_kind_is_refused(study, options):
     with pytest.raises(UsageError):
-        bs.compare({"scenario": "kashyap-set-2", "filter": ["ekf"], "runs": 0})
+        bs.compare(study, **options)
+
+
+def test_one_filter_may_be_named_without_a_list():
+    result = bs.compare(TWO_LINES, filters="ukf", runs=4)
+    assert [cell.label for cell in result.cells] == ["ekf", "ukf"]
+
+
+def test_an_interrupt_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("boresight.laboratory.run.run_study", interrupted)
+    how = {"runs": 4, "seed": 0, "engine": "threads"}
+    manner = Manner(command="boresight compare a.toml -o out")
+    with pytest.raises(KeyboardInterrupt):
+        compare(PAPER, manner, folder=tmp_path, **how)
+    assert "boresight compare a.toml -o out --resume" in capsys.readouterr().err
 
 
 def test_simulate_writes_truth_and_plots(tmp_path):

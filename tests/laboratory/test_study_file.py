@@ -1,5 +1,6 @@
 """Studies that can be run: what each setting of the file becomes, sweeps, and the examples."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -193,6 +194,37 @@ def test_a_sensor_that_is_carried_goes_with_its_ship():
     heard = only(study_from(given | {"sensor": cone})).scenario.sensor
     ahead = np.asarray(heard.pose.rotation)[0, 4, 0]
     assert ahead == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)  # the array lies along the course
+
+
+def test_a_start_from_two_plots_is_scored_from_the_second_on():
+    """At the first there is no track yet: what a filter says there is of 4 s later."""
+    begun = OWN | {"start": {"kind": "two plots"}}
+    study = study_from(begun)
+    assert study.first_scan == 1
+    assert study_from(OWN | {"start": {"kind": "one plot"}}).first_scan == 0
+    assert study_from(begun | {"first_scan": 5}).first_scan == 5
+    swept = OWN | {"sweep": {"start.kind": ["one plot", "two plots"]}}
+    assert study_from(swept).first_scan == 1
+    with pytest.raises(UsageError, match="first_scan = 1"):
+        replace(study, first_scan=0)
+
+
+def test_a_recorded_table_may_call_its_columns_otherwise(tmp_path):
+    flight = EXAMPLES[0].parent / "flight.csv"
+    named = {"time_s": "ts", "latitude_deg": "lat", "longitude_deg": "lon", "height_m": "alt"}
+    head, rest = flight.read_text().split("\n", 1)
+    for ours, theirs in named.items():
+        head = head.replace(ours, theirs)
+    (tmp_path / "flight.csv").write_text(f"{head}\n{rest}")
+    world = {"kind": "recorded", "site": ["47.45 deg", "8.55 deg", "430 m"]}
+    ours, theirs = (
+        only(study_from(OWN | {"scenario": world | of_table})).scenario.path
+        for of_table in (
+            {"file": str(flight)},
+            {"file": str(tmp_path / "flight.csv"), "columns": named},
+        )
+    )
+    assert np.array_equal(ours, theirs)
 
 
 def test_runs_and_seed_may_be_given_beside_the_file():

@@ -165,7 +165,23 @@ RANDOM = {"kind": "random", "range": ["1 km", "9 km"], "speed": "90 m/s", "scans
             "lacks a gate",
             "gate = 16",
         ),
-        ({"sensor": GOOD["sensor"] | {"false_plots": 2}}, "scenario", "coverage", "say how far"),
+        (
+            {
+                "sensor": GOOD["sensor"] | {"false_plots": 2},
+                "filter": [{"name": "ekf", "gate": 9.0}],
+            },
+            "sensor.false_plots",
+            "lacks coverage",
+            'coverage = "',
+        ),
+        ({"filter": [{"name": "ekf", "label": "a\nb"}]}, "filter[0].label", "no label", "line"),
+        ({"filter": [{"name": "ekf", "label": "x" * 61}]}, "filter[0].label", "no label", "60"),
+        (
+            {"start": {"kind": "two plots"}, "first_scan": 0},
+            "first_scan",
+            "before the start",
+            "scan 1",
+        ),
         (
             {"sensor": GOOD["sensor"] | {"range_rate": {"sigma": "1 m/s", "correlation": 1.5}}},
             "sensor.range_rate.correlation",

@@ -195,3 +195,17 @@ def test_progress_ends_with_all_runs_and_a_bad_folder_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):
         study_tables(study_from(RADAR, runs=2), tmp_path / "file")
+
+
+@pytest.mark.parametrize("rows", [10, 10**6])
+def test_a_full_disk_is_told(tmp_path, monkeypatch, rows):
+    """Polars words it as a computation that failed."""
+
+    def full(*_, **__):
+        raise pl.exceptions.ComputeError("underlying IO error: No space left (os error 28)")
+
+    monkeypatch.setattr("boresight.laboratory.tables._SMALL", rows)
+    monkeypatch.setattr(pl.DataFrame, "write_parquet", full)
+    monkeypatch.setattr(pl.LazyFrame, "sink_parquet", full)
+    with pytest.raises(OutputError, match="No space left"):
+        study_tables(study_from(RADAR, runs=2), tmp_path)

@@ -294,5 +294,5 @@ def test_what_cannot_be_run_is_refused_in_a_sentence():
         run_chunk(*cell(cluttered, Outside(name="mine", function=ekf_by_hand), gate=16.0), 0, 1)
     with pytest.raises(UsageError, match="needs cone_rad"):
         run_chunk(*cell(SPACE, sensor=Radar(cone_deg=1.0)), 0, 1)
-    with pytest.raises(UsageError, match="none of 12 scans"):
+    with pytest.raises(UsageError, match="last of 12 scans"):
         run_chunk(*cell(SPACE, first_scan=12), 0, 1)

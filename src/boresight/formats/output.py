@@ -1,6 +1,8 @@
 """Tables out: Parquet, CSV and GeoJSON, each with the version that wrote it."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,21 +32,32 @@ def write_table(table: "pl.DataFrame", path: str | Path, kind: str) -> Path:
     """
     file = Path(path)
     about = {"boresight": version("boresight"), "table": kind, "table_version": TABLE_VERSION}
-    try:
-        _WRITERS[file.suffix.lower()](table, file, about)
-    except KeyError:
+    if file.suffix.lower() not in _WRITERS:
         raise UsageError(
             f"{file} has no format that can be written",
             why=f"known endings: {', '.join(_WRITERS)}",
             next_step=f"name it {file.stem}.parquet",
-        ) from None
-    except OSError as error:
+        )
+    with writing(file):
+        _WRITERS[file.suffix.lower()](table, file, about)
+    return file
+
+
+@contextmanager
+def writing(file: Path) -> Iterator[None]:
+    """OutputError where a file cannot be written; Polars words a full disk as its own error."""
+    from polars.exceptions import PolarsError
+
+    try:
+        yield
+    except (OSError, PolarsError) as error:
+        if isinstance(error, PolarsError) and "os error" not in str(error):
+            raise
         raise OutputError(
             f"{file} cannot be written",
-            why=str(error.strerror or error),
-            next_step=f"look at the folder: ls -ld {file.parent}",
+            why=str(getattr(error, "strerror", None) or error).rpartition("IO error: ")[2],
+            next_step=f"look at the disk and the folder: df {file.parent}; ls -ld {file.parent}",
         ) from None
-    return file
 
 
 def _parquet(table: "pl.DataFrame", file: Path, about: dict[str, str]) -> None:

@@ -7,7 +7,7 @@ from boresight.errors import UsageError
 from boresight.interfaces import door, screens_study
 from boresight.interfaces.answers import Answer
 from boresight.interfaces.studies import prepared
-from boresight.interfaces.terminal import Manner, progress
+from boresight.interfaces.terminal import Manner, progress, remark
 
 if TYPE_CHECKING:
     from boresight.laboratory.result import StudyResult
@@ -36,9 +36,15 @@ def compare(
         )
     study = prepared(file, runs=runs, seed=seed)
     target = door.folder(folder) if folder else None
-    with progress(f"Comparing, {study.name}", manner) as watch:
-        name = "threads" if engine == "local" else engine
-        result = run_study(study, engine=name, folder=target, progress=watch.count, **how)
+    name = "threads" if engine == "local" else engine
+    try:
+        with progress(f"Comparing, {study.name}", manner) as watch:
+            result = run_study(study, engine=name, folder=target, progress=watch.count, **how)
+    except KeyboardInterrupt:
+        if target and not manner.is_quiet:
+            again = manner.command if how.get("resume") else f"{manner.command} --resume"
+            remark([f"Interrupted; what is done is kept, go on with: {again}"])
+        raise
     outputs = write(result, target, manner) if target else []
     return Answer(
         content=content(result, outputs),

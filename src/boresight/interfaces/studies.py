@@ -6,11 +6,11 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from boresight.filters.method import Outside
+from boresight.errors import UsageError
+from boresight.filters.method import Filter, Outside
 from boresight.laboratory.study import Contender, Study
 
 if TYPE_CHECKING:
-    from boresight.filters.method import Filter
     from boresight.laboratory.result import StudyResult
 
 Engine = Literal["threads", "processes", "dask"]
@@ -75,18 +75,20 @@ def prepared(
     seed: int | None = None,
 ) -> Study:
     """A study that is ready to run, whatever it was given as."""
-    from boresight.laboratory.study_file import read_study, study_from
+    from boresight.laboratory.study_file import read_study, study_from, with_draws
 
     if isinstance(study, Study):
         found = study
     elif isinstance(study, Mapping):
         found = study_from(study)
-    else:
+    elif isinstance(study, str | PathLike):
         found = read_study(Path(fspath(study)))
-    if runs is not None:
-        found = replace(found, runs=runs)
-    if seed is not None:
-        found = replace(found, seed=seed)
+    else:
+        raise UsageError(
+            f"a {type(study).__name__} is no study",
+            next_step='give a study.toml, or {"scenario": "kashyap-set-2", "filter": ["ekf"]}',
+        )
+    found = with_draws(found, runs=runs, seed=seed)
     return found if filters is None else _with_filters(found, filters)
 
 
@@ -94,7 +96,14 @@ def _with_filters(study: Study, filters: "Sequence[str | Filter | Outside]") -> 
     """The study with these competing too; one of a name that competes already takes its place."""
     from boresight import catalogue
 
-    wanted = [catalogue.lookup(each) if isinstance(each, str) else each for each in filters]
+    named = [filters] if isinstance(filters, str | Filter | Outside) else filters
+    wanted = [catalogue.lookup(each) if isinstance(each, str) else each for each in named]
+    for each in wanted:
+        if not isinstance(each, Filter | Outside):
+            raise UsageError(
+                f"a {type(each).__name__} is no filter",
+                next_step='give a name such as "ekf", a bs.Filter or a bs.Outside',
+            )
     settings = []
     for setting in study.settings:
         first = setting.contenders[0]

@@ -65,6 +65,9 @@ def run_study(
         MissingExtraError: Dask is not installed.
         OutputError: the folder cannot be written; the scheduler does not answer, or is lost.
     """
+    for name, value in (("chunk", chunk), ("workers", workers)):
+        if value is not None and not isinstance(value, int):
+            raise UsageError(f"{name}={value!r} is not a whole number")
     if chunk is not None and chunk < 1:
         raise UsageError(f"chunk={chunk} is less than one run", next_step="give at least 1")
     if resume and folder is None:

@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 from boresight.errors import UsageError
 from boresight.experiments.scenario import Scenario
 from boresight.filters.method import Filter, Outside
+from boresight.maths import seeds
 from boresight.models.motion import Motion
 from boresight.models.sensors import Sensor
 
@@ -100,7 +101,8 @@ class Study:
         seed: of all that is random, 0 to 2^64 - 1.
         truth, noise: `each` run has its own, or all share the `one` of run 0.
         metrics: what is measured.
-        first_scan: scans before this one are simulated and filtered but not scored.
+        first_scan: scans before this one are simulated and filtered but not scored; of a start
+            from two plots, which is at the second, at least 1.
         limits: numbers that metrics need.
         false_alarm: of bands and intervals.
     """
@@ -117,22 +119,48 @@ class Study:
     false_alarm: float = 0.01
 
     def __post_init__(self) -> None:
-        if self.runs < 1:
+        if isinstance(self.runs, int) and self.runs < 1:
             raise UsageError(
                 f"runs={self.runs} is less than one", next_step="give at least one run: --runs 100"
             )
+        seeds.check(self.seed, self.runs, 0)
         for setting in self.settings:
-            labels = [each.label for each in setting.contenders]
-            twice = sorted({each for each in labels if labels.count(each) > 1})
-            if twice:
-                raise UsageError(
-                    f"two filters of the study are called {twice[0]!r}",
-                    next_step='give one of them another label: label = "..."',
-                )
+            _check_labels(setting)
+            check_first_scan(self.first_scan, setting.scenario)
 
     @property
     def cells(self) -> tuple[tuple[int, int], ...]:
         """(setting, contender) numbers of every cell."""
         return tuple(
             (i, j) for i, each in enumerate(self.settings) for j in range(len(each.contenders))
+        )
+
+
+def _check_labels(setting: Setting) -> None:
+    labels = [each.label for each in setting.contenders]
+    twice = sorted({each for each in labels if labels.count(each) > 1})
+    if twice:
+        raise UsageError(
+            f"two filters of the study are called {twice[0]!r}",
+            next_step='give one of them another label: label = "..."',
+        )
+
+
+def first_known(scenario: Scenario) -> int:
+    """The first scan at which filters know where the target is: the last that makes their start."""
+    return max(scenario.spent - 1, 0)
+
+
+def check_first_scan(first_scan: int, scenario: Scenario) -> None:
+    """UsageError where scans are to be scored at which there is no track yet, or none at all."""
+    known = first_known(scenario)
+    if first_scan < known:
+        raise UsageError(
+            f"first_scan = {first_scan} is before the start from {scenario.begin}",
+            next_step=f"score from scan {known}: first_scan = {known}",
+        )
+    if first_scan >= scenario.scans:
+        raise UsageError(
+            f"first_scan = {first_scan} is not before the last of {scenario.scans} scans",
+            next_step="score from an earlier scan",
         )

@@ -14,7 +14,8 @@ The whole format, of which two lines are enough (`scenario = "kashyap-set-2"` an
     kind = "waypoints"              #   points, speed, lateral_accel; scans, site
     points = [["20 km", "-30 km", "3 km"], ["20 km", "40 km", "3 km"]]   # North, East, up
     speed = "220 m/s"               # or one at each point
-                                    # "recorded": file, site, target; scans
+                                    # "recorded": file, site, target; scans; of a table also
+                                    #   columns = { time_s = "ts", latitude_deg = "lat" }
                                     # "random": scans; range and azimuth, or north and east;
                                     #   speed, heading, height, climb: "3 km" always,
                                     #   ["1 km", "9 km"] any between, {mean = "3 km", sd = "1 km"}
@@ -60,19 +61,26 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from boresight.errors import DataError
 from boresight.formats.recording import readable
-from boresight.laboratory.mistakes import Mistake, StudyError
-from boresight.laboratory.study import USUAL, Limits, Setting, Study
+from boresight.laboratory.mistakes import Mistake, StudyError, attempt
+from boresight.laboratory.study import (
+    USUAL,
+    Limits,
+    Setting,
+    Study,
+    check_first_scan,
+    first_known,
+)
 from boresight.laboratory.study_checks import checked
 from boresight.laboratory.study_filters import contenders_of
 from boresight.laboratory.study_models import StudyFile
 from boresight.laboratory.study_worlds import world_of
 from boresight.laboratory.sweep import Variant, variants
-from boresight.maths import seeds
 
 _LARGEST = 1_000_000  # bytes of a file that somebody wrote
 _PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
@@ -115,9 +123,7 @@ def study_from(
 def with_draws(study: Study, *, runs: int | None, seed: int | None) -> Study:
     """The study with other runs or another seed; UsageError where they cannot be."""
     changed: dict[str, Any] = {"runs": runs, "seed": seed}
-    study = replace(study, **{name: each for name, each in changed.items() if each is not None})
-    seeds.check(study.seed, study.runs, 0)
-    return study
+    return replace(study, **{name: each for name, each in changed.items() if each is not None})
 
 
 def _text(file: Path) -> str:
@@ -165,17 +171,19 @@ def _study(raw: dict[str, Any], name: str, text: str, folder: Path, usual_name: 
     if mistakes:
         raise StudyError(name, text, mistakes)
     file, limits = made[0][0], Limits()
+    settings = tuple(setting for _, setting in made if setting is not None)
+    earliest = max(first_known(each.scenario) for each in settings)
     known = {f"{name}_m": each for name, each in file.limits if name != "order"}
     known |= {"order": file.limits.order}
     return Study(
         name=file.name or usual_name,
-        settings=tuple(setting for _, setting in made if setting is not None),
+        settings=settings,
         runs=file.runs,
         seed=file.seed,
         truth=file.split.truth,
         noise=file.split.noise,
         metrics=tuple(dict.fromkeys(file.metrics or USUAL)),
-        first_scan=file.first_scan,
+        first_scan=earliest if file.first_scan is None else file.first_scan,
         limits=replace(limits, **{name: each for name, each in known.items() if each is not None}),
         false_alarm=file.false_alarm or Study.false_alarm,
     )
@@ -200,9 +208,8 @@ def _setting(
     wrong: list[Mistake] = []
     world = world_of(file, folder, wrong)
     contenders = contenders_of(file.filter, world, wrong)
-    if world is not None and file.first_scan >= world.scans:
-        what = f"first_scan = {file.first_scan} is not before the last of {world.scans} scans"
-        wrong.append(Mistake(("first_scan",), what, "score from an earlier scan"))
+    if world is not None and file.first_scan is not None:
+        attempt(wrong, ("first_scan",), partial(check_first_scan, file.first_scan, world))
     mistakes += [variant.located(each) for each in _causes(found, wrong)]
     if world is None:
         return file, None

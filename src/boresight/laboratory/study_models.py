@@ -7,7 +7,15 @@ whether a filter, a scenario or a recording is there is for those that make them
 from functools import partial
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+)
 
 from boresight.errors import UsageError
 from boresight.experiments.scenario import Begin
@@ -18,6 +26,7 @@ from boresight.laboratory.study import Draws, Metric
 _LEG = [["20 km", "-30 km"], ["20 km", "40 km"]]
 DEFAULT_RUNS = 1000
 LARGEST_SEED = 2**64 - 1
+LONGEST_LABEL = 60
 
 
 def _quantity(kind: q.Kind) -> BeforeValidator:
@@ -50,6 +59,12 @@ def _as_list(value: Any) -> Any:
 def _as_table(value: Any) -> Any:
     """A name alone is a table with a name."""
     return {"name": value} if isinstance(value, str) else value
+
+
+def _as_label(value: str) -> str:
+    if not value.isprintable() or len(value) > LONGEST_LABEL:
+        raise ValueError("is no label", f"give one line of at most {LONGEST_LABEL} characters")
+    return value
 
 
 Length = Annotated[float, _quantity(q.LENGTH)]
@@ -141,6 +156,7 @@ class RecordedTable(Table):
     file: Annotated[str, Field(examples=["flight.csv"])]
     site: Annotated[Place, Field(examples=[["47 deg", "8 deg", "400 m"]])]
     target: str | None = None
+    columns: dict[str, str] = {}
     scans: Annotated[int, AtLeastOne] | None = None
 
 
@@ -205,7 +221,7 @@ class FilterTable(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True, strict=True, allow_inf_nan=False)
 
     name: Annotated[str, Field(examples=["ekf"])]
-    label: str | None = None
+    label: Annotated[str, AfterValidator(_as_label)] | None = None
     motion: MotionTable | None = None
     noise_scale: Annotated[float, Positive] = 1.0
     gate: Annotated[float, Positive] | None = None
@@ -234,7 +250,7 @@ class StudyFile(Table):
     runs: Annotated[int, AtLeastOne] = DEFAULT_RUNS
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
     metrics: Annotated[list[Metric], Field(min_length=1)] | None = None
-    first_scan: Annotated[int, NotNegative] = 0
+    first_scan: Annotated[int, NotNegative] | None = None
     false_alarm: Annotated[Share, Field(gt=0, lt=1)] | None = None
     scenario: AnyWorld | None = None
     motion: MotionTable | None = None

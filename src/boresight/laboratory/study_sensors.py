@@ -115,7 +115,7 @@ def sensor_of(
     return attempt(mistakes, ("sensor",), lambda: Radar(**changed, **others))
 
 
-def sight_of(table: SensorTable, metre: float = 1.0) -> dict[str, Any]:
+def sight_of(table: SensorTable, mistakes: list[Mistake], *, metre: float = 1.0) -> dict[str, Any]:
     """Fields of a scenario: what is detected, what is biased, what is false."""
     bias = {}
     for name, (_, component) in COMPONENTS.items():
@@ -123,7 +123,12 @@ def sight_of(table: SensorTable, metre: float = 1.0) -> dict[str, Any]:
         if part is not None and part.bias is not None:
             value = part.bias / (metre if name in _LENGTHS else 1.0)
             bias[component] = np.radians(value) if component.endswith("_rad") else value
-    coverage = None if table.coverage is None else table.coverage / metre
+    coverage = table.coverage
+    if table.false_plots and coverage is None:
+        what = "sensor lacks coverage, and there are false plots"
+        mistakes.append(Mistake(("sensor", "false_plots"), what, 'give coverage = "100 km"'))
+        coverage = 1.0  # for the rest to be looked at
+    coverage = None if coverage is None else coverage / metre
     found: dict[str, Any] = {"detection": table.detection, "false_plots": table.false_plots}
     found |= {"coverage_m": coverage, "bias": bias or None}
     return {name: value for name, value in found.items() if value is not None}

@@ -1,5 +1,6 @@
 """From what a study file says of the world to a scenario."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path as File
@@ -84,7 +85,7 @@ def _paper(
     if None in changed.values():
         return None
     near = {name: start[name] / metre for name in ("range_m", "range_sd_m") if name in start}
-    changed |= start | near | sight_of(seen, metre)
+    changed |= start | near | sight_of(seen, mistakes, metre=metre)
     return attempt(mistakes, ("scenario",), lambda: replace(found, **changed))
 
 
@@ -108,12 +109,14 @@ def _own(
     moves = file.motion or _usual_motion(table)
     motion = motion_of(moves, ("motion",), None, dims, mistakes)
     others: dict[str, Any] = {"sensor": radar, "dt_s": dt_s, "motion": motion, "name": table.name}
-    others |= {"scans": table.scans} | sight_of(seen)
+    others |= {"scans": table.scans} | sight_of(seen, mistakes)
     if isinstance(table, WaypointsTable):
         return attempt(mistakes, ("scenario",), lambda: flight(table, **others))
     if isinstance(table, RandomTable):
         return attempt(mistakes, ("scenario",), lambda: _random(table, others))
-    source = attempt(mistakes, ("scenario", "file"), lambda: _recording(folder / table.file))
+    source = attempt(
+        mistakes, ("scenario", "file"), lambda: _recording(folder / table.file, table.columns)
+    )
     if source is None or site is None:
         return None
     target = table.target
@@ -159,14 +162,14 @@ def _random(table: RandomTable, others: dict[str, Any]) -> Scenario:
     )
 
 
-def _recording(path: File) -> Any:
+def _recording(path: File, columns: Mapping[str, str]) -> Any:
     """What the file holds of its targets, read once for all settings of a sweep."""
     about = readable(path).stat()
-    return _read(str(path), about.st_mtime_ns, about.st_size)
+    return _read(str(path), tuple(columns.items()), about.st_mtime_ns, about.st_size)
 
 
 @lru_cache(maxsize=1)
-def _read(path: str, *_: int) -> Any:
+def _read(path: str, columns: tuple[tuple[str, str], ...], *_: int) -> Any:
     from boresight.calibration.references import from_file
 
-    return from_file(path)
+    return from_file(path, columns=dict(columns))

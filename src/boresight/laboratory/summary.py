@@ -140,8 +140,11 @@ def _per_scan(gathered: Gathered, bound: Bound) -> dict[str, Array]:
 def _remarks(study: Study) -> Iterator[str]:
     """What keeps a number from meaning what it usually does."""
     if study.runs < FEWEST:
-        yield f"{study.runs} runs are too few for intervals: {FEWEST} or more are needed."
-    if "one" in (study.truth, study.noise):
+        few = "1 run is" if study.runs == 1 else f"{study.runs} runs are"
+        yield f"{few} too few for intervals: {FEWEST} or more are needed."
+    if study.truth == study.noise == "one":
+        yield "All runs share one truth and one noise: they are one run, and no interval holds."
+    elif "one" in (study.truth, study.noise):
         which = "truth" if study.truth == "one" else "noise"
         yield (
             f"All runs share one {which}: averages are those of that {which}, and even a "

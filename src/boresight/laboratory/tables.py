@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from boresight.errors import OutputError
 from boresight.experiments.scenario import Scenario
 from boresight.experiments.simulate import Plots, Truth, simulate
 from boresight.experiments.world import World
-from boresight.formats.output import TABLE_VERSION, write_table
+from boresight.formats.output import TABLE_VERSION, write_table, writing
 from boresight.laboratory.study import Setting, Study
 from boresight.maths.frames import geodetic_from_enu
 from boresight.models.sensors import Pose
@@ -67,7 +66,8 @@ def study_tables(
     total, done, paths = float(study.runs * len(worlds)), 0.0, []
     for label, scenario in worlds.items():
         place = folder / label if len(worlds) > 1 else folder
-        _make(place)
+        with writing(place):
+            place.mkdir(parents=True, exist_ok=True)
         for table in _tables(scenario):
             paths += _write(study, scenario, table, place)
         done += study.runs
@@ -135,26 +135,9 @@ def _sink(parts: "Callable[[], Iterator[pl.DataFrame]]", path: Path, kind: str) 
 
     about = {"boresight": version("boresight"), "table": kind, "table_version": TABLE_VERSION}
     rows = register_io_source(lambda *_: parts(), schema=next(parts()).schema)
-    try:
+    with writing(path):
         rows.sink_parquet(path, metadata=about)
-    except OSError as error:
-        raise _unwritable(path, error) from None
     return path
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _unwritable(folder, error) from None
-
-
-def _unwritable(path: Path, error: OSError) -> OutputError:
-    return OutputError(
-        f"{path} cannot be written",
-        why=str(error.strerror or error),
-        next_step=f"look at the folder: ls -ld {path.parent}",
-    )
 
 
 def _truth(scenario: Scenario, runs: Array, truth: Truth, plots: Plots) -> "pl.DataFrame":

@@ -104,7 +104,7 @@ def generator(seed: int, cell: str, stream: Stream, run: int) -> np.random.Gener
 def check(seed: int, runs: int, first: int) -> None:
     """UsageError where a seed, a number of runs or the first one's number is out of range."""
     for name, value in (("seed", seed), ("runs", runs), ("first", first)):
-        if not isinstance(value, int | np.integer):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer):
             raise UsageError(f"{name}={value!r} is not a whole number")
     if not 0 <= seed < _WORD:
         raise UsageError(f"seed={seed} is outside 0 to 2^64 - 1", next_step="give another seed")
