@@ -57,14 +57,14 @@ def measured(scenario, name, *, first=0, runs=RUNS, **split):
     return estimate, truth, metrics.nees(estimate, truth) / truth.states.shape[2]
 
 
-def assert_same(scores, estimate, truth, nees, rtol=1e-9):
-    """Every usual score is what `metrics` says of the same runs."""
+def assert_same(scores, estimate, truth, nees, rtol=1e-9, metre=1.0):
+    """Every usual score is what `metrics` says of the same runs, whose lengths are `metre` m."""
     runs, sums = scores.runs, Tree(scores.nodes).total
     scored, close = slice(SKIPPED, None), {"rtol": rtol, "atol": 1e-12}
     error = metrics.errors(estimate, truth)
-    position = metrics.squared_error(estimate, truth)
+    position = metre**2 * metrics.squared_error(estimate, truth)
     at = metrics.elements(truth.names, "position")
-    claimed = np.trace(estimate.cov[..., at, :][..., at], axis1=-2, axis2=-1)
+    claimed = metre**2 * np.trace(estimate.cov[..., at, :][..., at], axis1=-2, axis2=-1)
     np.testing.assert_allclose(runs["position_sq_m2"], position[:, scored].mean(1), **close)
     np.testing.assert_allclose(runs["final_m"], np.sqrt(position[:, -1]), **close)
     np.testing.assert_allclose(runs["nees"], nees[:, scored].mean(1), rtol=100 * rtol)
@@ -92,7 +92,8 @@ def assert_same(scores, estimate, truth, nees, rtol=1e-9):
 def test_scores_are_the_metrics_of_the_same_runs(scenario, name):
     world = replace(lookup(scenario), scans=20) if "kashyap" in scenario else lookup(scenario)
     scores = run_chunk(*cell(world, name), 2, RUNS)
-    assert_same(scores, *measured(world, name, first=2), rtol=1e-8)
+    metre = 1000.0 if world.length_unit == "km" else 1.0
+    assert_same(scores, *measured(world, name, first=2), rtol=1e-8, metre=metre)
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mekf"])

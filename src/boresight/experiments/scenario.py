@@ -105,6 +105,11 @@ class Scenario:
         check_sight(self)
 
     @property
+    def metre(self) -> float:
+        """Metres in one unit of its lengths."""
+        return 1000.0 if self.length_unit == "km" else 1.0
+
+    @property
     def spent(self) -> int:
         """How many scans make the start; their plots are not used again."""
         return SPENT[self.begin]

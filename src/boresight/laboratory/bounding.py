@@ -57,7 +57,7 @@ def _bound(study: Study, scenario: Scenario) -> Bound:
         truth, plots = _flown(study, scenario, first, min(batch, runs - first))
         at = elements(truth.names, "position")
         each = bound_per_trajectory(truth, plots, scenario.motion, scenario.sensor)
-        variances.append(np.sum(each[:, :, at, at], axis=-1))
+        variances.append(scenario.metre**2 * np.sum(each[:, :, at, at], axis=-1))
     variance = np.concatenate(variances)
     of_runs = np.mean(variance[:, scored], axis=1)
     position = float(np.sqrt(np.mean(of_runs)))
@@ -102,7 +102,7 @@ def _information(study: Study, scenario: Scenario, runs: int) -> tuple[float, st
     except UsageError as error:
         return np.nan, f"{scenario.name}: {error}."
     traces = np.sum(found[study.first_scan :, at, at], axis=-1)
-    return float(np.sqrt(np.mean(traces))), ""
+    return float(scenario.metre * np.sqrt(np.mean(traces))), ""
 
 
 def _told(scenario: Scenario, runs: int) -> str:

@@ -9,13 +9,15 @@ import numpy as np
 from boresight.laboratory.intervals import ratio_interval
 from boresight.laboratory.result import Cell, Comparison, StudyResult
 
+_LESS = 1.0 - 1e-9  # a ratio that is less than 1 by more than rounding
+
 
 def compared(cells: Sequence[Cell], false_alarm: float) -> Iterator[Comparison]:
     """Every two contenders of one setting.
 
-    A win needs an interval that excludes 1. Of equal numbers the ratio is exactly 1 in every
-    resample, so a filter never wins against itself; against one whose error is no number every
-    filter wins whose error is one.
+    A win needs an interval that excludes 1 by more than rounding, which is all that two forms of
+    one filter differ by; so a filter never wins against itself. Against one whose error is no
+    number every filter wins whose error is one.
 
     Args:
         cells: of one setting.
@@ -25,7 +27,7 @@ def compared(cells: Sequence[Cell], false_alarm: float) -> Iterator[Comparison]:
         first, second = sorted((one, two), key=_error)  # stable: of equals the first stays so
         ours, others = (cell.per_run["position_sq_m2"] for cell in (first, second))
         ratio = ratio_interval(ours, others, false_alarm)
-        yield Comparison(first.setting, first.label, second.label, ratio, ratio.high < 1.0)
+        yield Comparison(first.setting, first.label, second.label, ratio, ratio.high < _LESS)
 
 
 def _error(cell: Cell) -> float:

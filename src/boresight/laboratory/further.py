@@ -57,7 +57,8 @@ def _bias(study: Study, scenario: Scenario, contender: Contender, gathered: Gath
     yield from (
         (f"bias_{name}", float(x)) for name, x in zip(names, mean.mean(axis=0), strict=True)
     )
-    square = np.sum(np.square(mean[:, elements(names, "position")]), axis=1)
+    off = scenario.metre * mean[:, elements(names, "position")]
+    square = np.sum(np.square(off), axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         noise = (gathered.sums["position_sq_m2"][scored] / runs - square) / (runs - 1)
         away = np.where(np.isfinite(square), np.sqrt(square / noise), np.inf)

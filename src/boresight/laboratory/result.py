@@ -79,7 +79,7 @@ class Comparison(NamedTuple):
         setting: number in the study.
         better, other: labels; `better` has the smaller position RMSE.
         ratio: RMSE of `better` over that of `other`, with its paired bootstrap interval.
-        is_win: whether the interval excludes 1.
+        is_win: whether the interval excludes 1, by more than rounding.
     """
 
     setting: int

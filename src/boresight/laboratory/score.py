@@ -32,12 +32,14 @@ class Score:
         truth, estimate: names of their states.
         metrics: that were asked for.
         limits: numbers that they need.
+        metre: metres in one unit of their positions; errors of single states keep that unit.
     """
 
     truth: tuple[str, ...]
     estimate: tuple[str, ...]
     metrics: tuple[Metric, ...]
     limits: Limits
+    metre: float = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,8 +96,9 @@ class Score:
         error = np.array([_or_infinite(x) for x in mean - truth[of]])
         position, velocity = self._places("x_", "y_", "z_"), self._places("vx_", "vy_", "vz_")
         normalised, positive = _normalised_square(error, cov)
-        claimed = sum(cov[i, i] for i in position)
-        square = sum(error[i] * error[i] for i in position)
+        area = self.metre * self.metre
+        claimed = area * sum(cov[i, i] for i in position)
+        square = area * sum(error[i] * error[i] for i in position)
         columns = {
             "error": error,
             "position_sq_m2": square,

@@ -42,8 +42,8 @@ def run_chunk(
         The scores. Those of a run, and of a node, are the same to the last bit in every chunk.
 
     Raises:
-        UsageError: the contender needs what the setting's sensor does not measure, or a gate; no
-            scan is scored; a seed or runs out of range.
+        UsageError: the contender needs what the setting's sensor does not measure, or a gate; a
+            seed or runs out of range.
     """
     chunk = Chunk(study, setting, contender, trial_of(study, setting, contender))
     check(study.seed, count, first)
@@ -77,16 +77,15 @@ def told_again(
 def trial_of(study: Study, setting: Setting, contender: Contender) -> Trial:
     """The formulas of a cell."""
     world = World(setting.scenario, setting.scenario.sensor)
-    names, scans = world.sensor.names, world.scenario.scans
-    if not 0 <= study.first_scan < scans:
-        raise UsageError(f"first_scan={study.first_scan} leaves none of {scans} scans to be scored")
+    names = world.sensor.names
     unknown = [name for name in contender.sensor.names if name not in names]
     if unknown:
         raise UsageError(
             f"{contender.label!r} needs {unknown[0]}",
             why=f"the sensor of scenario {setting.scenario.name!r} measures {', '.join(names)}",
         )
-    score = Score(world.scenario.motion.names, contender.motion.names, study.metrics, study.limits)
+    states = world.scenario.motion.names, contender.motion.names
+    score = Score(*states, study.metrics, study.limits, world.scenario.metre)
     measured = tuple(names.index(name) for name in contender.sensor.names)
     return Trial(world, _recursion(contender, world.candidates), score, measured)
 

@@ -58,7 +58,8 @@ class Trial:
     def _identity(self) -> tuple[Any, ...]:
         own = self.recursion
         models = [structure(m) for m in (own.motion, own.sensor, own.guard) if m is not None]
-        return (self.world, own.method, *models, self.score, self.measured)
+        rates = tuple((name, leaf, rate) for name, (leaf, rate, _) in self.beliefs.items())
+        return (self.world, own.method, *models, rates, self.score, self.measured)
 
     def __hash__(self) -> int:
         return hash(self._identity)
