@@ -14,6 +14,7 @@ from html_page import Page, embedded, needs_chromium, running_browser
 import boresight as bs
 from boresight.errors import UsageError
 from boresight.interfaces.comparing import compare
+from boresight.interfaces.report import study_words
 from boresight.interfaces.terminal import Manner
 
 STUDIES = Path(__file__).parents[2] / "examples" / "studies"
@@ -150,6 +151,37 @@ def test_the_screen_fits_80_columns_and_names_the_verdict(swept, monkeypatch):
     assert "…" not in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert "too sure" in done.stdout
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_every_filter_has_its_name_on_screens_of_any_width(swept, monkeypatch, width):
+    """However long its figures are."""
+    folder, _ = swept
+    monkeypatch.setenv("COLUMNS", str(width))
+    text = SWEPT.replace('range.sigma = "30 m"', 'range.sigma = "1e9 m"')
+    (folder / "vast.toml").write_text(text, encoding="utf-8")
+    done = boresight("compare", folder / "vast.toml", "--runs", 10)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert max(map(len, lines)) <= width
+    assert "…" not in done.stdout
+    assert sum(line.split()[:1] == ["ekf"] for line in lines if "m " in line) >= 2
+
+
+def test_one_run_of_one_filter_is_not_told_in_the_plural(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('scenario = "kashyap-set-2"\nfilter = "ekf"\nruns = 1\n', encoding="utf-8")
+    done = boresight("compare", path)
+    assert "1 cell of 1 run," in done.stdout
+    assert "1 run is too few" in done.stderr
+    assert "1 run of 1 setting," in boresight("simulate", path, "-o", tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    ("value", "words"), [(0.0, "0"), (1.0, "100 %"), (0.995, "100 %"), (0.0012, "0.12 %")]
+)
+def test_shares_are_told_in_digits(value, words):
+    assert study_words.share(value) == words
 
 
 def test_a_notebook_shows_the_ranking_and_a_picture(swept):

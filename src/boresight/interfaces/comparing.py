@@ -97,6 +97,7 @@ def simulate(
     file: Path, manner: Manner, *, runs: int | None, seed: int | None, folder: Path
 ) -> Answer:
     """Write the truth and the plots of a study."""
+    from boresight.interfaces.report.words import count
     from boresight.interfaces.screens import text, written
     from boresight.laboratory.tables import study_tables
 
@@ -105,5 +106,6 @@ def simulate(
     with progress(f"Simulating, {study.name}", manner) as watch:
         outputs = [str(path) for path in study_tables(study, target, progress=watch.count)]
     found = {"outputs": outputs, "runs": study.runs, "seed": study.seed}
-    head = f"{study.name}: {study.runs:,} runs of {len(study.settings)} settings, seed {study.seed}"
+    many = f"{count(study.runs, 'run')} of {count(len(study.settings), 'setting')}"
+    head = f"{study.name}: {many}, seed {study.seed}"
     return Answer(content=found, screen=lambda _width: [text(head, "bold"), *written(outputs)])

@@ -12,8 +12,9 @@ from boresight.interfaces.report.study_words import (
     ends,
     rmse,
     setting_name,
+    share,
 )
-from boresight.interfaces.report.words import figure
+from boresight.interfaces.report.words import count, figure
 from boresight.interfaces.screens import table, text, written
 
 if TYPE_CHECKING:
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 
     from boresight.laboratory.result import Cell, StudyResult
 
-WIDE = 110
+WIDE, MIDDLE = 110, 80
+LEAST = {"interval": WIDE, "velocity": WIDE, "median": MIDDLE, "band": MIDDLE, "ns": MIDDLE}
+LABEL = 8  # characters that a name has at least
 STYLES = {"consistent": "green", "too sure": "red", "too modest": "yellow", "no number": "red"}
 DETAILED = 4  # settings whose doubts are printed; the report has them all
 
@@ -29,7 +32,8 @@ DETAILED = 4  # settings whose doubts are printed; the report has them all
 def studied(result: "StudyResult", outputs: Sequence[str], width: int) -> "list[RenderableType]":
     """The screen of `boresight compare`."""
     study = result.study
-    head = f"{study.name}: {len(result.cells)} cells of {study.runs:,} runs, seed {study.seed}"
+    cells, runs = count(len(result.cells), "cell"), count(study.runs, "run")
+    head = f"{study.name}: {cells} of {runs}, seed {study.seed}"
     parts: list[RenderableType] = [text(head, "bold"), text("")]
     settings = range(len(study.settings))
     for setting in settings:
@@ -41,34 +45,36 @@ def studied(result: "StudyResult", outputs: Sequence[str], width: int) -> "list[
 
 def _ranking(result: "StudyResult", setting: int, width: int) -> "RenderableType":
     cells = cells_of(result, setting)
-    percent = f"{100 * (1 - result.study.false_alarm):g} %"
-    wide = width >= WIDE
-    before = ["position", "interval", "median"] if wide else ["position", "median"]
-    heads = ["filter", *before, "× bound", *(["velocity"] if wide else []), "ANEES"]
-    grid = table(setting_name(cells[0].values), *heads, f"{percent} band", "", "lost", "ns")
+    rows = [_row(cell) for cell in cells]
+    shown = [head for head in rows[0] if width >= LEAST.get(head, 0)]
+    band = f"{100 * (1 - result.study.false_alarm):g} % band"
+    heads = [band if head == "band" else head for head in shown]
+    grid = table(setting_name(cells[0].values), *heads)
     grid.title = grid.title or None
-    grid.columns[0].no_wrap = False  # a long label takes two lines, not the figures' place
-    grid.columns[0].overflow = "fold"
-    for cell in cells:
-        low, high = cell.anees_bounds
-        words = consistency(cell)
-        position = [rmse(cell.position_rmse_m, "m"), figure(cell.median_rmse_m, 3)]
-        grid.add_row(
-            cell.label,
-            *([position[0], ends(cell.position_rmse_m), position[1]] if wide else position),
-            figure(cell.ratio_to_bound, 3),
-            *([rmse(cell.velocity_rmse_mps, "m/s")] if wide else []),
-            figure(cell.anees.value, 3),
-            f"{low:.3f}–{high:.3f}",
-            text(words, STYLES[words]),
-            _share(cell),
-            figure(cell.ns_per_step, 3),
-        )
+    label = grid.columns[0]  # a long one takes more lines, not the figures' place
+    label.no_wrap, label.overflow, label.min_width = False, "fold", LABEL
+    for row in rows:
+        grid.add_row(*(row[head] for head in shown))
     return grid
 
 
-def _share(cell: "Cell") -> str:
-    return f"{100 * cell.diverged.value:.2g} %" if cell.diverged.value else "0"
+def _row(cell: "Cell") -> "dict[str, RenderableType]":
+    """What is told of a filter, by the heads of columns."""
+    low, high = cell.anees_bounds
+    words = consistency(cell)
+    return {
+        "filter": cell.label,
+        "position": rmse(cell.position_rmse_m, "m"),
+        "interval": ends(cell.position_rmse_m),
+        "median": figure(cell.median_rmse_m, 3),
+        "× bound": figure(cell.ratio_to_bound, 3),
+        "velocity": rmse(cell.velocity_rmse_mps, "m/s"),
+        "ANEES": figure(cell.anees.value, 3),
+        "band": f"{low:.3f}–{high:.3f}",
+        "": text(words, STYLES[words]),
+        "lost": share(cell.diverged.value),
+        "ns": figure(cell.ns_per_step, 3),
+    }
 
 
 def _verdicts(result: "StudyResult", setting: int) -> "list[RenderableType]":

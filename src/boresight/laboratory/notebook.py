@@ -18,10 +18,15 @@ SHOWN = 6  # settings that are drawn
 def html(result: StudyResult) -> str:
     """The study as HTML."""
     study = result.study
-    head = f"<b>{escape(study.name)}</b>: {study.runs:,} runs, seed {study.seed}"
+    runs = "1 run" if study.runs == 1 else f"{study.runs:,} runs"
+    head = f"<b>{escape(study.name)}</b>: {runs}, seed {study.seed}"
     each = "".join(_setting(result, i) for i in range(len(study.settings))[:SHOWN])
     rest = len(study.settings) - SHOWN
-    more = f"<p>and {rest} more settings: see <code>.table</code></p>" if rest > 0 else ""
+    more = (
+        f"<p>and {rest} more setting{'s' * (rest > 1)}: see <code>.table</code></p>"
+        if rest > 0
+        else ""
+    )
     remarks = "".join(f"<p><small>{escape(each)}</small></p>" for each in result.remarks)
     return f"<div>{head}{each}{more}{remarks}</div>"
 

@@ -14,6 +14,7 @@ from boresight.interfaces.report.study_words import (
     rmse,
     sentences,
     setting_name,
+    share,
 )
 from boresight.interfaces.report.words import figure, panel
 from boresight.laboratory.frames import row_of
@@ -101,7 +102,7 @@ def _caption(name: str, alarm: str) -> str:
 def _tiles(result: StudyResult) -> tuple[Tile, ...]:
     best = cells_of(result, 0)[0]
     known = sum(consistency(cell) == "consistent" for cell in result.cells)
-    share = max(cell.diverged.value for cell in result.cells)
+    worst = max(cell.diverged.value for cell in result.cells)
     interval = ends(best.position_rmse_m)
     first = setting_name(best.values)
     return (
@@ -114,7 +115,7 @@ def _tiles(result: StudyResult) -> tuple[Tile, ...]:
             escape(first or "averaged in covariance"),
         ),
         Tile("consistent", f"{known} of {len(result.cells)}", "by their ANEES"),
-        Tile("runs", figure(result.study.runs), f"at most {100 * share:.2g} % diverged"),
+        Tile("runs", figure(result.study.runs), f"at most {share(worst)} diverged"),
     )
 
 

@@ -10,6 +10,7 @@ from boresight.interfaces.report.study_words import (
     consistency,
     ends,
     setting_name,
+    share,
 )
 from boresight.interfaces.report.words import Cell as TableCell
 from boresight.interfaces.report.words import figure, label, number_cell, table, text_cell
@@ -64,8 +65,8 @@ def _number(value: float) -> TableCell:
 
 def _share(value: Interval) -> TableCell:
     if not value.value:
-        return TableCell(f"0 (&lt; {100 * value.high:.2g} %)", "0", is_figure=True)
-    words = f"{100 * value.value:.3g} % ({100 * value.low:.2g} to {100 * value.high:.2g})"
+        return TableCell(f"0 (&lt; {share(value.high)})", "0", is_figure=True)
+    words = f"{100 * value.value:.3g} % ({share(value.low)} to {share(value.high)})"
     return TableCell(words, f"{value.value:.9g}", is_figure=True)
 
 

@@ -38,6 +38,11 @@ def ends(value: Interval, digits: int = 3) -> str:
     return f"{figure(value.low, digits)} to {figure(value.high, digits)}"
 
 
+def share(value: float) -> str:
+    """Render a share of runs: `0.4 %`, `100 %`; of none `0`."""
+    return f"{float(f'{100 * value:.2g}'):g} %" if value else "0"
+
+
 def consistency(cell: Cell) -> str:
     """What the ANEES says, in two words at most."""
     low, high = cell.anees_bounds
@@ -57,15 +62,22 @@ def wins(result: StudyResult, setting: int, label: str) -> list[Comparison]:
 
 def beside(result: StudyResult, setting: int, label: str) -> str:
     """Whom a contender is better than, and from whom it cannot be told."""
-    beaten = [each.other for each in wins(result, setting, label)]
+    won = wins(result, setting, label)
     open_ = [
         each.other if each.better == label else each.better
         for each in result.comparisons
         if each.setting == setting and not each.is_win and label in (each.better, each.other)
     ]
-    parts = [f"better than {_and(beaten)}"] if beaten else []
+    parts = [f"better than {_and([each.other for each in won])} ({_by(won)})"] if won else []
     parts += [f"not told apart from {_and(open_)}"] if open_ else []
     return "; ".join(parts)
+
+
+def _by(won: Sequence[Comparison]) -> str:
+    """By how much the errors are smaller: `by 0.02 to 3 %`."""
+    shares = sorted(1.0 - each.ratio.value for each in won)
+    low, high = (share(each) for each in (shares[0], shares[-1]))
+    return f"by {high}" if low == high else f"by {low.removesuffix(' %')} to {high}"
 
 
 def _and(names: Sequence[str]) -> str:

@@ -15,11 +15,11 @@ from boresight.interfaces.report import (
 from boresight.interfaces.report.residuals import Panel
 from boresight.interfaces.report.sections import Block, Part, Tile, points
 from boresight.interfaces.report.tma_facts import told
-from boresight.interfaces.report.tma_tables import count, stem
+from boresight.interfaces.report.tma_tables import stem
 from boresight.interfaces.report.tma_verdict import sentences, summary
 from boresight.interfaces.report.tma_view import View
 from boresight.interfaces.report.tma_words import KINDS, estimate, hull
-from boresight.interfaces.report.words import figure, panel
+from boresight.interfaces.report.words import count, figure, panel
 
 if TYPE_CHECKING:
     from boresight.target_motion.result import TargetMotion, TmaResult

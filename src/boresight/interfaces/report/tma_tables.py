@@ -16,7 +16,7 @@ from boresight.interfaces.report.tma_words import (
     knots,
     region,
 )
-from boresight.interfaces.report.words import Cell, figure, number_cell, table, text_cell
+from boresight.interfaces.report.words import Cell, number_cell, table, text_cell
 
 if TYPE_CHECKING:
     from boresight.target_motion.result import Quantity, Side, TargetMotion
@@ -145,11 +145,6 @@ def _quantity(kind: Kind, found: "Quantity") -> list[Cell]:
 def _lines(words: str) -> str:
     """Put each piece of a region on a line of its own."""
     return words.replace(" or ", "<br>or ") or "–"
-
-
-def count(number: int, word: str) -> str:
-    """Render `1 bearing`, `12 bearings`."""
-    return f"{figure(number)} {word}{'' if number == 1 else 's'}"
 
 
 COLUMNS: "dict[str, Callable[[TargetMotion], Cell]]" = {

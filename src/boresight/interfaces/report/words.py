@@ -30,6 +30,9 @@ NIS_WORDS = {
 }
 
 
+LARGE = 1e7
+
+
 class Cell(NamedTuple):
     """One cell of a table: HTML, the key it sorts by, and whether it is a figure."""
 
@@ -39,14 +42,24 @@ class Cell(NamedTuple):
 
 
 def figure(value: float | None, digits: int = 4) -> str:
-    """Render a number to `digits` significant digits, with thousands parted; a dash for none."""
+    """Render a number to `digits` significant digits, with thousands parted; a dash for none.
+
+    What is no count and has more than seven places in front is `5.12e10`.
+    """
     if value is None or not math.isfinite(value):
         return "–"
     if isinstance(value, int) or value == 0:
         return f"{value:,.0f}"
+    if abs(value) >= LARGE:
+        return f"{value:.{digits - 1}e}".replace("e+0", "e").replace("e+", "e")
     rounded = float(f"{value:.{digits - 1}e}")  # 0.09999999 has the places of 0.1
     places = max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)
     return f"{value:,.{places}f}"
+
+
+def count(number: int, word: str) -> str:
+    """Render `1 bearing`, `12 bearings`."""
+    return f"{figure(number)} {word}{'' if number == 1 else 's'}"
 
 
 def gain(value: "Gain") -> str:
