@@ -265,18 +265,30 @@ def test_a_reader_that_leaves_is_no_error(arguments):
     assert said == ""
 
 
+def opened(pipe):
+    """A pipe's writing end, once somebody reads: the program has started, and is at work."""
+    end = time.monotonic() + 30
+    while True:
+        try:
+            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:
+            assert time.monotonic() < end, "nobody reads"
+            time.sleep(0.05)
+
+
 def test_control_c_ends_with_130_and_no_traceback(tmp_path):
     pipe = tmp_path / "endless.ast"
-    os.mkfifo(pipe)  # opening it waits for ever, so the signal finds the program at work
+    os.mkfifo(pipe)  # nothing ever comes, so the signal finds the program at work
     running = subprocess.Popen(
         [sys.executable, "-m", "boresight", "inspect", str(pipe)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(1.5)
+    end = opened(pipe)
     running.send_signal(signal.SIGINT)
     _, said = running.communicate(timeout=20)
+    os.close(end)
     assert running.returncode == 130
     assert "Traceback" not in said
 

@@ -51,11 +51,15 @@ class StudyError(UsageError):
         told = [_told(each, text, spots) for each in self.mistakes]
         self.told = sorted(told, key=lambda each: (each.line, each.column))
         count = len(told)
-        super().__init__(f"{name} has {count} mistakes" if count > 1 else f"{name} has a mistake")
+        super().__init__(
+            f"{name} has {count} mistakes" if count > 1 else f"{name} has a mistake",
+            next_step=f"correct {'them' if count > 1 else 'it'}, and run the same command again",
+        )
 
     def __str__(self) -> str:
         """The count, then each mistake with its line."""
-        return "\n".join([self.what, *(_shown(each, self.name, self.text) for each in self.told)])
+        shown = (_shown(each, self.name, self.text) for each in self.told)
+        return "\n".join([self.what, *shown, f"  next: {self.next_step}"])
 
     @property
     def details(self) -> dict[str, Any]:
