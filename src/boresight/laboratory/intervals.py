@@ -4,10 +4,12 @@ Runs are independent, scans of a run are not: so the data are one number of each
 
 [hesterberg2015] T. C. Hesterberg, "What Teachers Should Know About the Bootstrap: Resampling in
 the Undergraduate Statistics Curriculum": percentiles widened as Student's t is wider than the
-normal. Differs from it: beyond 512 runs, groups of neighbouring runs are drawn again instead of
-runs, which changes nothing but the cost: spread and skewness of an average are those of its groups'
-averages. Measured with skewed errors, intervals of 99 % miss in 3 % of studies of 10 runs, 2 % of
-20, and 0.8 to 1.4 % from 50 on.
+normal; [efron1987] B. Efron, "Better Bootstrap Confidence Intervals": and moved as the runs'
+skewness asks for, or nearly all intervals that miss would end below the truth. Differs from them:
+beyond 512 runs, groups of neighbouring runs are drawn again instead of runs, which changes nothing
+but the cost: spread and skewness of an average are those of its groups' averages. Measured with
+skewed errors, intervals of 99 % miss in 2 to 5 % of studies of 10 runs, 1.5 to 2.5 % of 20, 1 to
+1.8 % of 50 and 1 to 1.4 % from 100 on.
 
 A run whose error is no number makes the average infinite, with certainty: what has happened can
 happen, however often other runs are drawn.
@@ -26,6 +28,7 @@ RESAMPLES = 4000
 FEWEST = 10  # runs; of less than these no interval is told
 _GROUPS = 512
 _SAME = 1e-12  # squared relative spread below which runs are one and the same
+_LEAST = 1e-3  # of a factor that few runs of great skewness could make negative
 UNTOLD = (0.0, np.inf)
 
 
@@ -34,7 +37,7 @@ def mean_interval(values: Array, false_alarm: float) -> Interval:
     average = float(np.mean(values))
     if not np.isfinite(average):
         return Interval(average, average, average)
-    return Interval(average, *_ends(_resampled(values), len(values), false_alarm))
+    return Interval(average, *_ends(_resampled(values), average, values - average, false_alarm))
 
 
 def rms_interval(squares: Array, false_alarm: float) -> Interval:
@@ -54,7 +57,8 @@ def ratio_interval(ours: Array, others: Array, false_alarm: float) -> Interval:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = float(np.sqrt(np.divide(*over)))
         drawn = np.sqrt(_resampled(ours) / _resampled(others))
-    return Interval(ratio, *_ends(drawn, len(ours), false_alarm))
+        pulls = ours / over[0] - others / over[1]
+    return Interval(ratio, *_ends(drawn, ratio, pulls, false_alarm))
 
 
 def _resampled(values: Array) -> Array:
@@ -76,14 +80,32 @@ def _counts(groups: int) -> Array:
     return generator.multinomial(groups, shares, size=RESAMPLES).astype(float)
 
 
-def _ends(drawn: Array, runs: int, false_alarm: float) -> tuple[float, float]:
-    from scipy.special import ndtr, stdtrit
+def _ends(drawn: Array, value: float, pulls: Array, false_alarm: float) -> tuple[float, float]:
+    """Between which ends the truth lies.
 
+    Args:
+        drawn: the estimate of each resample.
+        value: that of the runs themselves.
+        pulls: (runs,) how each run moves it, to any scale.
+        false_alarm: of the interval.
+    """
+    from scipy.special import ndtr, ndtri, stdtrit
+
+    runs = len(pulls)
     if runs < FEWEST or np.isnan(drawn).any():
         return UNTOLD
     wider = np.sqrt(runs / (runs - 1)) * stdtrit(runs - 1, false_alarm / 2)
-    low, high = np.quantile(drawn, [ndtr(wider), 1 - ndtr(wider)])
+    bias = ndtri((np.mean(drawn < value) + np.mean(drawn <= value)) / 2)
+    moved = bias + np.array([wider, -wider])
+    skewed = np.maximum(1.0 - _acceleration(pulls) * moved, _LEAST)
+    low, high = np.quantile(drawn, ndtr(bias + moved / skewed))
     return float(low), float(high)
+
+
+def _acceleration(pulls: Array) -> float:
+    """A sixth of the skewness of the pulls' sum; 0 where none pulls."""
+    square = float(np.sum(np.square(pulls)))
+    return float(np.sum(pulls**3)) / (6.0 * square**1.5) if square > 0.0 else 0.0
 
 
 def anees_band(nees: Array, states: int, false_alarm: float) -> tuple[float, float]:
