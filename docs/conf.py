@@ -8,9 +8,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-from pygments.lexers.special import TextLexer
-from sphinx.application import Sphinx
-
 import boresight
 
 DOCS = Path(__file__).parent
@@ -42,7 +39,14 @@ logging.getLogger("traitlets").setLevel(logging.WARNING)
 project, author = "boresight", "The boresight authors"
 copyright = author  # noqa: A001 - Sphinx's name for it
 version = release = boresight.__version__
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_design", "console"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_design",
+    "console",
+    "mermaid",
+]
 exclude_patterns = ["_build"]
 
 html_theme = "furo"
@@ -71,8 +75,3 @@ nitpick_ignore_regex = [
     ("py:class", r"(collections|boresight)\..*"),  # of signatures, not public by themselves
     ("py:exc", r"\w+Error"),  # all are in the tree of errors, few are public names
 ]
-
-
-def setup(app: Sphinx) -> None:
-    """Drawings are shown as they are written."""
-    app.add_lexer("mermaid", TextLexer)

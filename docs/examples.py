@@ -2,7 +2,8 @@
 
 Examples run in a folder that holds what the pages speak of: `night.ast` is the recording that comes
 with boresight, `bearings.csv` and `own-ship.csv` are an example of this repository, studies are
-those of its `examples/studies`. The tests run the examples of every page and of the README alike.
+those of its `examples/studies`, `study.toml` being one of them. The tests run the examples of every
+page and of the README alike, and hold what a page shows to what is printed.
 """
 
 import os
@@ -26,6 +27,7 @@ def furnish(folder: Path) -> Path:
     (folder / "night.ast").write_bytes(recording.read_bytes())
     for path in [*(ROOT / "examples/tma").glob("*.csv"), *(ROOT / "examples/studies").iterdir()]:
         shutil.copy(path, folder / path.name)
+    shutil.copy(ROOT / "examples/studies/poor-bearings.toml", folder / "study.toml")
     shutil.copytree(ROOT / "examples", folder / "examples", dirs_exist_ok=True)
     return folder
 
@@ -52,6 +54,39 @@ def run(command: str, folder: Path) -> str:
     return "\n".join(line.rstrip() for line in done.stdout.splitlines()).strip("\n")
 
 
-def shown(lines: list[str], rows: int | None) -> list[str]:
-    """The first rows of a long answer."""
-    return lines if rows is None or len(lines) <= rows else [*lines[:rows], "..."]
+def shown(lines: list[str], begin: str = "", rows: int | None = None) -> list[str]:
+    """So many rows of a long answer, from the first that begins with these words."""
+    first = next(i for i, line in enumerate(lines) if line.startswith(begin))
+    last = len(lines) if rows is None else first + rows
+    before, after = ["..."] * (first > 0), ["..."] * (last < len(lines))
+    return [*before, *lines[first:last], *after]
+
+
+def told(block: str) -> list[tuple[str, str]]:
+    """Each command of a block with what the page says that it prints."""
+    parts = re.split(r"^(\$ .*)$", block, flags=re.MULTILINE)[1:]
+    pairs = zip(parts[::2], parts[1::2], strict=True)
+    return [(next(commands(line)), after.strip()) for line, after in pairs]
+
+
+def differs(said: str, printed: str) -> str | None:
+    """The first thing that is said and was not printed, in this order; `...` leaves things out.
+
+    How lines are folded, and measured times (the last column where a table's is `ns`, and whatever
+    is followed by ns, µs or ms) are nobody's promise.
+    """
+    rest = _timeless(printed)
+    for piece in _timeless(said).split("..."):
+        words = piece.strip()
+        if words not in rest:
+            return words
+        rest = rest[rest.index(words) + len(words) :]
+    return None
+
+
+def _timeless(text: str) -> str:
+    lines, in_table = [], False
+    for line in text.splitlines():
+        in_table = (in_table and bool(line.strip())) or line.rstrip().endswith(" ns")
+        lines.append(re.sub(r"[\d.,]+\s*$", "TIME", line) if in_table else line)
+    return " ".join(re.sub(r"[\d.,]+ (?:ns|µs|ms)\b", "TIME", " ".join(lines)).split())
