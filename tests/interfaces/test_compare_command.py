@@ -296,3 +296,14 @@ def test_simulate_writes_truth_and_plots(tmp_path):
     seen = next(table for table in tables if "range_m" in table.columns)
     assert seen["range_m"].to_numpy() == pytest.approx(plots.z[..., 0].ravel(), rel=1e-12)
     assert truth.states.shape[0] == 3
+
+
+def test_before_a_start_from_two_plots_nothing_is_told_of_a_track():
+    """Errors of the first scan would be those of a track that begins one scan later."""
+    result = bs.compare(TWO_LINES | {"start": {"kind": "two plots"}}, runs=20)
+    scans = result.every_scan.select("position_rmse_m", "nees", "bound_m").to_numpy()
+    assert np.isnan(scans[0]).all()
+    assert np.isfinite(scans[1:]).all()
+    assert scans[1, 0] < 3 * scans[2, 0]
+    assert "boresight-report" in bs.report(result).html
+    assert result._repr_html_().count("<polyline") == 2

@@ -26,7 +26,7 @@ from boresight.laboratory.intervals import (
 from boresight.laboratory.result import Cell, Comparison, Interval, StudyResult
 from boresight.laboratory.scores import Gathered
 from boresight.laboratory.sentences import doubts, verdicts
-from boresight.laboratory.study import Study
+from boresight.laboratory.study import Study, first_known
 
 Array = Any
 
@@ -106,7 +106,7 @@ def _cell(study: Study, place: tuple[int, int], gathered: Gathered, best: _Best)
         diverged=diverged(runs["nees"], alarm),
         ns_per_step=gathered.seconds * 1e9 / (gathered.count * scenario.scans),
         extra=extra,
-        per_scan=_per_scan(gathered, bound),
+        per_scan=_per_scan(gathered, bound, first_known(scenario)),
         per_run=gathered.runs,
         verdicts=(),
     )
@@ -128,13 +128,18 @@ def diverged(nees: Array, false_alarm: float) -> Interval:
     return Interval(true / runs, *share_interval(true, runs, false_alarm))
 
 
-def _per_scan(gathered: Gathered, bound: Bound) -> dict[str, Array]:
-    means = {
+def _per_scan(gathered: Gathered, bound: Bound, known: int) -> dict[str, Array]:
+    """Means of each scan; no numbers before the one at which tracks start."""
+    found = {
         name: total / gathered.count
         for name, total in gathered.sums.items()
         if name != "error_outer"
     }
-    return means | ({"bound_m2": bound.per_scan_m2} if bound.trajectories else {})
+    if bound.trajectories:
+        found["bound_m2"] = np.array(bound.per_scan_m2)
+    for name in found.keys() - {"nis", "dof"}:  # of which there are none before, rightly
+        found[name][:known] = np.nan
+    return found
 
 
 def _remarks(study: Study) -> Iterator[str]:
