@@ -11,6 +11,7 @@ from boresight import catalogue
 from boresight.experiments.scenario import lookup
 from boresight.laboratory.comparing import compared
 from boresight.laboratory.study import Contender, Limits
+from boresight.laboratory.study_file import study_from
 from boresight.laboratory.trial import told_again
 
 
@@ -107,3 +108,11 @@ def test_filters_that_believe_alike_but_for_how_often_it_changes():
     np.testing.assert_allclose(
         one.per_run["position_sq_m2"], other.per_run["position_sq_m2"], rtol=1e-9
     )
+
+
+def test_a_sweep_of_one_filter_by_its_label_leaves_the_others():
+    filters = [{"name": "ekf"}, {"name": "ekf", "label": "cautious"}]
+    swept = {"filter.cautious.noise_scale": [1.0, 4.0]}
+    study = study_from({"scenario": "kashyap-set-4", "filter": filters, "sweep": swept})
+    sigmas = [[c.sensor.range_m for c in each.contenders] for each in study.settings]
+    assert sigmas == [[30.0, 30.0], [30.0, 60.0]]

@@ -25,6 +25,7 @@ EXACT = [
     ("3.6 km/h", q.SPEED, 1.0),
     ("450 kn", q.SPEED, 231.5),
     ("450 kt", q.SPEED, 231.5),
+    ("6000 ft/min", q.SPEED, 30.48),
     ("2 m/s^2", q.ACCELERATION, 2.0),
     ("2 m/s²", q.ACCELERATION, 2.0),
     ("1 g", q.ACCELERATION, 9.80665),
