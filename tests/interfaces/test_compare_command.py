@@ -307,3 +307,16 @@ def test_before_a_start_from_two_plots_nothing_is_told_of_a_track():
     assert scans[1, 0] < 3 * scans[2, 0]
     assert "boresight-report" in bs.report(result).html
     assert result._repr_html_().count("<polyline") == 2
+
+
+def test_where_no_bound_can_be_had_the_remark_says_why(swept):
+    """Of a range to a nanometre, beside a start that knows the speed to 300 m/s."""
+    folder, _ = swept
+    text = (STUDIES / "waypoints.toml").read_text(encoding="utf-8").partition("[sweep]")[0]
+    path = folder / "exact.toml"
+    path.write_text(
+        text.replace('range.sigma = "50 m"', 'range.sigma = "1e-9 m"'), encoding="utf-8"
+    )
+    result = bs.compare(path, runs=4)
+    assert np.isnan(result.cells[0].pcrlb_m)
+    assert "cannot be inverted" in result.remarks[0]

@@ -47,7 +47,9 @@ def bound_of(study: Study, scenario: Scenario) -> Bound:
     try:
         return _bound(study, scenario)
     except (UsageError, np.linalg.LinAlgError) as error:
-        return nothing(scenario, f"No Cramér-Rao bound of {scenario.name}: {error}.")
+        singular = isinstance(error, np.linalg.LinAlgError)
+        why = "its information cannot be inverted in double precision" if singular else str(error)
+        return nothing(scenario, f"No Cramér-Rao bound of {scenario.name}: {why}.")
 
 
 def _bound(study: Study, scenario: Scenario) -> Bound:
@@ -110,9 +112,8 @@ def _told(scenario: Scenario, runs: int) -> str:
     first = "trajectory" if runs == 1 else f"{runs:,} trajectories"
     words = f"The Cramér-Rao bound of {scenario.name} is that of the first {first}"
     if scenario.path is not None:
-        words += (
-            f"; the path is given, and the bound assumes the process noise of {scenario.motion!r}"
-        )
+        words += "; the path is given and not drawn, and the bound assumes the process noise of "
+        words += f"{scenario.motion!r}: of a smoother path, errors may lie below it"
     if scenario.begin == "given":
         words += "; filters start at the given state and not at a draw around it, so that at first "
         words += "errors may lie below it"

@@ -115,7 +115,11 @@ def _tiles(result: StudyResult) -> tuple[Tile, ...]:
             escape(first or "averaged in covariance"),
         ),
         Tile("consistent", f"{known} of {len(result.cells)}", "by their ANEES"),
-        Tile("runs", figure(result.study.runs), f"at most {share(worst)} diverged"),
+        Tile(
+            "runs",
+            figure(result.study.runs),
+            f"at most {share(worst)} diverged" if worst else "none diverged",
+        ),
     )
 
 

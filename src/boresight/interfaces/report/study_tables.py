@@ -13,7 +13,7 @@ from boresight.interfaces.report.study_words import (
     share,
 )
 from boresight.interfaces.report.words import Cell as TableCell
-from boresight.interfaces.report.words import figure, label, number_cell, table, text_cell
+from boresight.interfaces.report.words import count, figure, label, number_cell, table, text_cell
 from boresight.laboratory.result import Cell, Interval, StudyResult
 
 MARKS = {
@@ -40,7 +40,7 @@ def ranking(result: StudyResult) -> str:
 
 def _ranking(result: StudyResult, setting: int) -> str:
     cells = cells_of(result, setting)
-    name = setting_name(cells[0].values) or f"{cells[0].runs:,} runs"
+    name = setting_name(cells[0].values) or count(cells[0].runs, "run")
     heads = ["filter", "position, m", "interval", "median run", "× bound", "velocity, m/s"]
     heads += ["ANEES", "band", "verdict", "NIS/dof", "diverged", "ns a step"]
     return table(name, heads, map(_row, cells), sortable=True)
@@ -66,7 +66,8 @@ def _number(value: float) -> TableCell:
 def _share(value: Interval) -> TableCell:
     if not value.value:
         return TableCell(f"0 (&lt; {share(value.high)})", "0", is_figure=True)
-    words = f"{100 * value.value:.3g} % ({share(value.low)} to {share(value.high)})"
+    low = share(value.low).removesuffix(" %")
+    words = f"{share(value.value)} ({low} to {share(value.high)})"
     return TableCell(words, f"{value.value:.9g}", is_figure=True)
 
 
@@ -104,7 +105,7 @@ def comparisons(result: StudyResult) -> str:
     ]
     if not any(result.study.settings[each.setting].values for each in result.comparisons):
         heads, rows = heads[1:], [row[1:] for row in rows]
-    caption = f"{len(rows)} comparisons on the same runs and random numbers"
+    caption = f"{count(len(rows), 'comparison')} on the same runs and random numbers"
     return table(caption, heads, rows, sortable=True)
 
 
