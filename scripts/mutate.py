@@ -21,6 +21,7 @@ import faults
 import faults_bearings
 import faults_calibration
 import faults_filters
+import faults_laboratory
 import faults_registration
 import faults_tables
 import faults_testing
@@ -30,7 +31,7 @@ from faults import Fault
 ROOT = Path(__file__).resolve().parents[1]
 _TABLES = (
     faults, faults_filters, faults_calibration, faults_registration, faults_tma, faults_bearings,
-    faults_tables, faults_testing,
+    faults_tables, faults_testing, faults_laboratory,
 )  # fmt: skip
 FAULTS = tuple(fault for table in _TABLES for fault in table.FAULTS)
 _JUDGED = {
@@ -44,6 +45,7 @@ def _tests(*names: str) -> tuple[str, ...]:
 
 KERNELS = _tests(
     *(f"lanes/test_{name}" for name in ("refusals", "program", "elementary", "kernels")),
+    *(f"lanes/test_{name}" for name in ("philox", "sums")),
     "laws/test_runs",
     "lanes/test_cache",
 )
@@ -82,7 +84,7 @@ JUDGES = {
 # What is compiled is judged so; of long recursions that is the quicker way too.
 _LONG = ("filters/error_", "mixtures/", "filters/mgekf", "filters/fisher", "filters/batch")
 _LONG += ("filters/reversible", "target_motion/observability")
-COMPILED = (KERNELS, *(JUDGES[prefix] for prefix in _LONG))
+COMPILED = (KERNELS, *(JUDGES[prefix] for prefix in (*_LONG, *faults_laboratory.JUDGES)))
 WANTED = 0.9
 PATIENCE_S = 900
 
