@@ -208,6 +208,7 @@ RANDOM = {"kind": "random", "range": ["1 km", "9 km"], "speed": "90 m/s", "scans
         ({"filter": [{"name": "ekf", "gate": float("nan")}]}, "filter[0].gate", "", ""),
         ({"filter": [{"name": "ekf", "noise_scale": "2"}]}, "filter[0].noise_scale", "number", ""),
         ({"filter": [{"name": "iekf", "iterations": "x"}]}, "filter[0].iterations", "", "default"),
+        ({"filter": "modified-polar"}, "filter[0]", "dims=3", "dims=2"),
         ({"filter": "emekf"}, "filter[0].name", "two steps", "error_model"),
         ({"seed": -1}, "seed", "at least 0", ""),
         ({"seed": 2**64}, "seed", "at most", ""),
@@ -271,7 +272,7 @@ def test_long_lines_are_cut_around_the_mistake(tmp_path):
     text += f'metrics = [{chr(34)}rmse{chr(34)},{" " * 200}"neees"]\n'
     lines = str(mistakes_of(text, tmp_path)).splitlines()
     assert max(map(len, lines)) < 140
-    assert lines[-2][lines[-1].index("^") :].startswith('"neees"')
+    assert lines[-3][lines[-2].index("^") :].startswith('"neees"')
 
 
 PLAIN = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)

@@ -164,6 +164,7 @@ def _try(found: Filter, motion: Motion, sensor: Sensor, world: Scenario) -> bool
         mean, cov = _begun(world, motion, sensor)
         try:
             recursion = found.recursion(_first(motion, "motion"), _first(sensor, "sensor"))
+            recursion.method.layout(motion, sensor)  # which says what it is not made for
             state = recursion.begin(np.reshape(mean, (-1, n))[0], np.reshape(cov, (-1, n, n))[0])
             inputs = {name: value for name, (value, _) in recursion.models().items()}
             recursion.step(state, inputs | {"z": _exact(world), "dt": world.dt_s})
