@@ -65,11 +65,7 @@ def run_study(
         MissingExtraError: Dask is not installed.
         OutputError: the folder cannot be written; the scheduler does not answer, or is lost.
     """
-    for name, value in (("chunk", chunk), ("workers", workers)):
-        if value is not None and not isinstance(value, int):
-            raise UsageError(f"{name}={value!r} is not a whole number")
-    if chunk is not None and chunk < 1:
-        raise UsageError(f"chunk={chunk} is less than one run", next_step="give at least 1")
+    _check_whole(chunk=chunk, workers=workers)
     if resume and folder is None:
         raise UsageError("there is no folder to resume from", next_step="give it: folder=...")
     remarks: list[str] = []
@@ -96,6 +92,14 @@ def run_study(
         kept.finish()
     found = summarise(study, [tallies[cell].gathered() for cell in study.cells])
     return replace(found, digest=digest(found.cells), remarks=(*found.remarks, *remarks))
+
+
+def _check_whole(*, chunk: int | None, workers: int | None) -> None:
+    for name, value in (("chunk", chunk), ("workers", workers)):
+        if value is not None and not isinstance(value, int):
+            raise UsageError(f"{name}={value!r} is not a whole number")
+    if chunk is not None and chunk < 1:
+        raise UsageError(f"chunk={chunk} is less than one run", next_step="give at least 1")
 
 
 def _opened(
