@@ -6,6 +6,8 @@ those of its `examples/studies`, `study.toml` being one of them. The tests run t
 page and of the README alike, and hold what a page shows to what is printed.
 """
 
+import contextlib
+import io
 import os
 import re
 import shlex
@@ -15,9 +17,10 @@ import sys
 from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
+from unittest import mock
 
 ROOT = Path(__file__).resolve().parents[1]
-COLUMNS = 88
+TERMINAL = {"COLUMNS": "88", "NO_COLOR": "1"}
 
 
 def furnish(folder: Path) -> Path:
@@ -30,6 +33,15 @@ def furnish(folder: Path) -> Path:
     shutil.copy(ROOT / "examples/studies/poor-bearings.toml", folder / "study.toml")
     shutil.copytree(ROOT / "examples", folder / "examples", dirs_exist_ok=True)
     return folder
+
+
+def blocks(path: Path, *kinds: str) -> list[str]:
+    """What stands in a page's fenced blocks of these kinds, without their options."""
+    fenced = re.findall(
+        r"^```([^\n`]+)\n(.*?)^```", path.read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
+    found = [text for kind, text in fenced if kind.split()[0] in kinds]
+    return [re.sub(r"^:[\w-]+:.*\n", "", text, flags=re.MULTILINE) for text in found]
 
 
 def commands(block: str) -> Iterator[str]:
@@ -45,13 +57,31 @@ def run(command: str, folder: Path) -> str:
     words = shlex.split(command)
     if words[0] == "boresight":
         words[:1] = [sys.executable, "-m", "boresight"]
-    width = {"COLUMNS": str(COLUMNS), "NO_COLOR": "1", "PYTHONWARNINGS": "error"}
+    env = os.environ | TERMINAL | {"PYTHONWARNINGS": "error"}
     done = subprocess.run(  # noqa: S603 - our own pages
-        words, cwd=folder, env=os.environ | width, capture_output=True, text=True, check=False
+        words, cwd=folder, env=env, capture_output=True, text=True, check=False
     )
     if done.returncode:
         raise RuntimeError(f"$ {command}\nexit {done.returncode}\n{done.stdout}{done.stderr}")
     return "\n".join(line.rstrip() for line in done.stdout.splitlines()).strip("\n")
+
+
+def call(command: str) -> str:
+    """What a command of boresight shows, run in this process and folder: quicker than `run`."""
+    from boresight.interfaces import cli
+
+    _, *words = shlex.split(command)
+    out, remarks = io.StringIO(), io.StringIO()
+    with (
+        mock.patch.dict(os.environ, TERMINAL),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(remarks),
+    ):
+        code = cli.run(words)
+    printed = out.getvalue() + remarks.getvalue()
+    if code:
+        raise RuntimeError(f"$ {command}\nexit {code}\n{printed}")
+    return printed
 
 
 def shown(lines: list[str], begin: str = "", rows: int | None = None) -> list[str]:

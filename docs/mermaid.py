@@ -4,7 +4,7 @@ The repository's web page draws a block of `mermaid` itself. Here the part of th
 pages use (`flowchart LR`, boxes, circles, labels, dotted arrows, subgraphs) becomes an SVG in the
 page's own colours, as in K. Sugiyama, S. Tagawa and M. Toda, "Methods for Visual Understanding of
 Hierarchical System Structures": columns by longest path, long arrows through places of their own in
-the columns that they pass, and in every column the mean of the neighbours decides the order. A label
+the columns they pass, and in every column the mean of the neighbours decides the order. A label
 is such a place too, so that no two arrows lie on each other.
 """
 
@@ -189,7 +189,8 @@ def draw(source: str) -> str:
     told = "; ".join(f"{a} to {b}" for a, b in _told(chart))
     return (
         f'<div class="chart"><svg viewBox="{left:.0f} {top:.0f} {wide - left:.0f} {high:.0f}" '
-        f'width="{wide - left:.0f}" role="img" aria-label="{escape(told)}">'
+        f'width="{wide - left:.0f}" style="min-width: {0.8 * (wide - left):.0f}px" '
+        f'role="img" aria-label="{escape(told)}">'
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" '
         'markerHeight="8" orient="auto"><path class="tip" d="M0,0.5 L8,4 L0,7.5 z"/></marker>'
         f"</defs>{''.join(drawn)}</svg></div>"
