@@ -3,7 +3,10 @@
 from faults import faults
 
 _SUMMARY = (
-    *(f"laboratory/test_{name}" for name in ("told_of_cells", "compared", "summary")),
+    *(
+        f"laboratory/test_{name}"
+        for name in ("intervals_of_averages", "told_of_cells", "compared", "summary")
+    ),
     "laboratory/test_null_studies",
 )
 _KEPT = ("laboratory/test_engines", "laboratory/test_checkpoints")
@@ -133,7 +136,6 @@ FAULTS = (
         ("np.sqrt(runs / (runs - 1)) * stdtrit(", "stdtrit("),
         ("stdtrit(runs - 1, false_alarm / 2)", "stdtrit(runs - 1, false_alarm)"),
         ("bias + moved / skewed", "bias + moved"),
-        ("bias + np.array([wider, -wider])", "np.array([wider, -wider])"),
         ("ours / over[0] - others / over[1]", "ours / over[0] + others / over[1]"),
         ("_resampled(ours) / _resampled(others)", "_resampled(ours) / float(np.mean(others))"),
         ("drawn = np.sqrt(_resampled(ours)", "drawn = (_resampled(ours)"),
