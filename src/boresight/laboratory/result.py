@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from boresight.laboratory.study import Study
@@ -130,18 +131,22 @@ class StudyResult:
 
     def __repr__(self) -> str:
         lines = [f"{self.study.name}: {self.study.runs:,} runs, seed {self.study.seed}"]
-        for cell in self.cells:
-            swept = " ".join(f"{name}={value}" for name, value in cell.values)
-            low, high = cell.anees_bounds
-            lines.append(
-                f"  {cell.label:<16} {swept} position {cell.position_rmse_m.value:.4g} m, "
-                f"{cell.ratio_to_bound:.3f} of the bound, ANEES {cell.anees.value:.3g} "
-                f"({low:.3f} to {high:.3f}), {100 * cell.diverged.value:.2g} % diverged"
-            )
-        return "\n".join(lines)
+        return "\n".join([*lines, *map(_line, self.cells)])
 
     def _repr_html_(self) -> str:
         """The ranking and the errors against the bound, in a notebook."""
         from boresight.laboratory.notebook import html
 
         return html(self)
+
+
+def _line(cell: Cell) -> str:
+    """A cell in one line."""
+    swept = "".join(f" {name}={value}" for name, value in cell.values)
+    low, high = cell.anees_bounds
+    bound = f"{cell.ratio_to_bound:.3f} of the bound, " if isfinite(cell.ratio_to_bound) else ""
+    return (
+        f"  {cell.label:<16}{swept} position {cell.position_rmse_m.value:.4g} m, {bound}"
+        f"ANEES {cell.anees.value:.3g} ({low:.3f} to {high:.3f}), "
+        f"{100 * cell.diverged.value:.2g} % diverged"
+    )

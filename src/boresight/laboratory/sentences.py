@@ -33,8 +33,10 @@ def doubts(study: Study, cell: Cell) -> tuple[str, ...]:
 
 
 def number(x: float) -> str:
-    """Three figures, thousands parted by commas."""
-    return f"{float(f'{x:.3g}'):,.10g}" if math.isfinite(x) else str(x)
+    """Three figures, thousands parted by commas; in a word what is none."""
+    if math.isfinite(x):
+        return f"{float(f'{x:.3g}'):,.10g}"
+    return "unknown" if math.isnan(x) else "infinite"
 
 
 def _in(x: Interval, percent: str, unit: str = "") -> str:
