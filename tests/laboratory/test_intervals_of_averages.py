@@ -39,7 +39,7 @@ def efron(statistic, *samples, error):
         n_resamples=4000,
         confidence_level=1 - error,
         method="BCa",
-        rng=np.random.default_rng(runs),
+        random_state=np.random.default_rng(runs),
     )
     return np.array(found.confidence_interval)
 
