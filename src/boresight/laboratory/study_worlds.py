@@ -73,7 +73,7 @@ def _paper(
     found = attempt(mistakes, ("scenario", "name"), lambda: scenario.lookup(table.name))
     if found is None:
         return None
-    metre = 1000.0 if found.length_unit == "km" else 1.0
+    metre = found.metre
     seen = file.sensor or SensorTable()
     for name in _OWN:
         if getattr(seen, name) is not None:

@@ -163,7 +163,7 @@ def _plots(scenario: Scenario, runs: Array, truth: Truth, plots: Plots) -> "pl.D
     z = plots.z[:, :, None] if plots.candidates is None else plots.candidates
     columns = _keys(runs, truth.time_s, z.shape[2])
     is_own = np.all(z == plots.z[:, :, None], axis=-1).ravel()
-    metre = 1000.0 if scenario.length_unit == "km" else 1.0
+    metre = scenario.metre
     for i, name in enumerate(scenario.sensor.names):
         columns |= dict([_column(name, z[..., i].ravel(), metre)])
     table = pl.DataFrame(columns).with_columns(
