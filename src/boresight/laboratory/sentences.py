@@ -13,7 +13,7 @@ PATH = "the path is given, and is smoother than the process noise that the bound
 def verdicts(study: Study, cell: Cell) -> tuple[str, ...]:
     """Sentences on a cell: its error, its lost runs, whether it knows its errors, and the rest."""
     percent = f"{100 * (1 - study.false_alarm):g} %"
-    parts = [_error(study, cell, percent), _lost(cell, percent), _anees(cell, percent)]
+    parts = [_error(study, cell, percent), _lost(cell, percent), _anees(study, cell, percent)]
     parts += [_anis(cell, percent), *_bias(cell, percent), *_further(cell, percent)]
     return tuple(f"{cell.label} {part}" for part in parts if part)
 
@@ -25,7 +25,7 @@ def doubts(study: Study, cell: Cell) -> tuple[str, ...]:
     parts = [
         "" if math.isfinite(cell.position_rmse_m.value) else _error(study, cell, percent),
         _lost(cell, percent) if cell.diverged.value else "",
-        "" if low <= cell.anees.value <= high else _anees(cell, percent),
+        "" if low <= cell.anees.value <= high else _anees(study, cell, percent),
         _anis(cell, percent),
         *_bias(cell, percent),
     ]
@@ -81,7 +81,7 @@ def _share(x: float) -> str:
     return f"{float(f'{100 * x:.2g}'):g} %"
 
 
-def _anees(cell: Cell, percent: str) -> str:
+def _anees(study: Study, cell: Cell, percent: str) -> str:
     low, high = cell.anees_bounds
     if math.isnan(cell.anees.value):
         return ""
@@ -91,6 +91,9 @@ def _anees(cell: Cell, percent: str) -> str:
         f"ANEES {cell.anees.value:.3f}, a consistent filter lies within {low:.3f} to {high:.3f} in "
         f"{percent} of studies"
     )
+    shared = [what for what in ("truth", "noise") if getattr(study, what) == "one"]
+    if shared:
+        where += f" where runs do not share one {' and one '.join(shared)}, as these do"
     factor = math.sqrt(cell.anees.value)
     if cell.anees.value > high:
         return f"is too sure of itself: {where}; its errors are {factor:.3f} times its claims."
