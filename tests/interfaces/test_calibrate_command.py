@@ -1,14 +1,13 @@
 """`boresight calibrate`, `track --calibration` and their verbs, on the recording in the package."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from importlib.resources import as_file, files
 
 import numpy as np
 import polars as pl
 import pytest
+from shell import boresight
 
 import boresight as bs
 from boresight.errors import DataError, MissingInputError, UsageError
@@ -27,15 +26,6 @@ SIX = {
 def demo():
     with as_file(files("boresight") / "demo" / "recording.ast") as path:
         yield path
-
-
-def boresight(*arguments):
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-m", "boresight", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 @pytest.fixture(scope="module")

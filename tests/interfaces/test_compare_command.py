@@ -2,14 +2,13 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 from html_page import Page, embedded, needs_chromium, running_browser
+from shell import boresight
 
 import boresight as bs
 from boresight.errors import UsageError
@@ -42,15 +41,6 @@ noise_scale = 0.5
 [sweep]
 "sensor.azimuth.sigma" = ["0.5 deg", "5 deg"]
 """
-
-
-def boresight(*arguments):
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-m", "boresight", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,12 @@
 """`boresight tma` and `bs.tma`, on the example that the project carries and on damaged copies."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
+from shell import boresight
 
 import boresight as bs
 from boresight.errors import DataError, UsageError
@@ -16,15 +15,6 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "tma"
 BEARINGS, OWN_SHIP, TRUTH = (EXAMPLE / f"{n}.csv" for n in ("bearings", "own-ship", "truth"))
 QUANTITIES = ("range_m", "bearing_deg", "course_deg", "speed_mps")
 CONTRACT = {"filter", "bearings", "converged_s", "observable", *QUANTITIES}
-
-
-def boresight(*arguments):
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-m", "boresight", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def answered(*arguments):

@@ -20,19 +20,11 @@ from boresight.models.motion import (
 from boresight.models.sensors import Bearings, ConicalBearings, Pose, Radar
 from boresight.testing import World
 from boresight.testing.subjects import Stepping
-from boresight.testing.worlds import tilted, turned
+from boresight.testing.worlds import FLYING, PLANE, SPACE, turned
 
 km = 1e3
 SITE = Site(latitude_deg=51.1, longitude_deg=1.2, height_m=45.0)
-PLANE = ConstantVelocity(accel_mps2=2.0, dims=2)
-SPACE = ConstantVelocity(accel_mps2=2.0, dims=3)
-
-
-POSE = Pose(
-    position_m=np.array([4 * km, -7 * km, 300.0]),
-    rotation=tilted(0.4, 0.2),
-    velocity_mps=np.array([120.0, -60.0, 3.0]),
-)
+POSE = FLYING
 POLAR = Radar(range_m=30.0, azimuth_deg=0.8, elevation_deg=0.6)
 PLANAR = Radar(range_m=30.0, azimuth_deg=0.8)
 MOVING = Radar(range_m=30.0, azimuth_deg=0.8, elevation_deg=0.6, range_rate_mps=2.0, pose=POSE)
