@@ -1,4 +1,6 @@
-"""Laws that every filter keeps, to hold your own filter to, in your own test-suite::
+"""Laws that every filter keeps, to hold your own filter to, in your own test-suite.
+
+For example::
 
     import boresight as bs
     import pytest
