@@ -23,6 +23,7 @@ from boresight.lanes import (
 from boresight.maths import Gaussian, gradient
 from boresight.models.parameters import rate_of
 from boresight.models.sensors import Pose
+from boresight.testing.worlds import tilted
 from lanes.machines import COMPILED, EVERY, compiled_targets, kernel_for, name_of, targets
 from laws.enrolled import (
     BEARING_WORLDS,
@@ -34,7 +35,6 @@ from laws.enrolled import (
     POLAR_WORLDS,
     SPACE,
     World,
-    tilted,
 )
 
 PAIRS = [

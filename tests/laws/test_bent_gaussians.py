@@ -11,7 +11,8 @@ from boresight.maths import Gaussian
 from boresight.maths.mixing import matched
 from boresight.models.motion import ConstantVelocity
 from boresight.models.sensors import Pose, Radar
-from laws.enrolled import CHIRP, MOVING, PLANAR, PLANE, POLAR, SPACE, Entry, World, turned
+from boresight.testing.worlds import turned
+from laws.enrolled import CHIRP, MOVING, PLANAR, PLANE, POLAR, SPACE, Entry, World
 
 MEAN = np.array([800.0, 2.1, 12.0, -20.0])
 COV = np.array(

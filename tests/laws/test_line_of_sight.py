@@ -16,7 +16,8 @@ from boresight.filters.line_of_sight_mixture import normal_as
 from boresight.filters.start import one_plot
 from boresight.maths import Gaussian
 from boresight.models.sensors import Pose, Radar
-from laws.enrolled import PLANAR, PLANE, POLAR_WORLDS, POSE, SPACE, World, tilted, turned
+from boresight.testing.worlds import tilted, turned
+from laws.enrolled import PLANAR, PLANE, POLAR_WORLDS, POSE, SPACE, World
 
 MEAN = np.array([800.0, 2.1, 12.0, -20.0])
 HIGH = np.array([8e3, 2.1, 0.6, 12.0, -120.0, 60.0])

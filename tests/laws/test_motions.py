@@ -18,7 +18,8 @@ from boresight.models.motion import (
     Static,
     WithHeightOffset,
 )
-from laws.enrolled import MOTIONS, turned
+from boresight.testing.worlds import turned
+from laws.enrolled import MOTIONS
 from laws.test_components import derivative
 from oracles import filters as textbook
 

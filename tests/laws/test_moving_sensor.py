@@ -12,6 +12,7 @@ import pytest
 from boresight.filters.recursion import run_recursion
 from boresight.maths import Gaussian
 from boresight.models.sensors import Pose, Radar
+from boresight.testing.worlds import turned
 from laws.enrolled import (
     BY_EAR,
     CHIRP,
@@ -23,7 +24,6 @@ from laws.enrolled import (
     SPACE,
     Entry,
     World,
-    turned,
 )
 
 LANES, STEPS, DT = 6, 12, 2.0

@@ -14,6 +14,7 @@ from boresight.errors import UsageError
 from boresight.filters.recursion import run_recursion
 from boresight.filters.stream import Stream
 from boresight.maths import Gaussian
+from boresight.testing.worlds import turned
 from laws.enrolled import (
     BEARING_WORLDS,
     BY_EAR,
@@ -22,7 +23,6 @@ from laws.enrolled import (
     PLANE,
     POSE,
     World,
-    turned,
 )
 
 LANES, STEPS, DT = 5, 6, 2.0

@@ -15,7 +15,8 @@ from boresight.lanes import Rate, Symmetric, Vector, reach, trace
 from boresight.maths import Gaussian
 from boresight.models.motion import ConstantVelocity, CoordinatedTurn
 from boresight.models.sensors import Pose, Radar
-from laws.enrolled import PLANAR, PLANE, POLAR, SPACE, Entry, World, tilted, turned
+from boresight.testing.worlds import tilted, turned
+from laws.enrolled import PLANAR, PLANE, POLAR, SPACE, Entry, World
 from oracles import filters as textbook
 from oracles import peers
 
