@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from boresight.interfaces.report.reproduce_rows import KINDS, LONG, value
-from boresight.interfaces.screens import text
+from boresight.interfaces.screens import text, written
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -32,14 +32,15 @@ def reproduced(key: str, found: dict[str, Any], width: int) -> "list[RenderableT
         *([_by_paper(found)] if several else [_verdicts(claims)]),
         text(""),
         text(_more(found), "dim"),
+        *written([found["report"]] if "report" in found else []),
     ]
 
 
 def _more(found: dict[str, Any]) -> str:
     """Where the rest is."""
     runs = f"{found['runs']} runs" if found["runs"] else "as many runs as each claim needs"
-    where = found.get("report") or "-o DIR writes a page with figures"
-    return f"seed {found['seed']}, {runs}; {where}; --json has all"
+    where = "" if "report" in found else "; -o DIR writes a page with figures"
+    return f"seed {found['seed']}, {runs}{where}; --json has all"
 
 
 def _counts(claims: list[dict[str, Any]]) -> str:
