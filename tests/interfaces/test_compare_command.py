@@ -1,19 +1,23 @@
 """`boresight compare` and `simulate`, `bs.compare`, the study's page, frames and notebook."""
 
+import io
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 from html_page import Page, embedded, needs_chromium, running_browser
+from rich.console import Console
 from shell import boresight
 
 import boresight as bs
 from boresight.errors import UsageError
 from boresight.interfaces.comparing import compare
 from boresight.interfaces.report import study_words
+from boresight.interfaces.screens_study import studied
 from boresight.interfaces.terminal import Manner
 
 STUDIES = Path(__file__).parents[2] / "examples" / "studies"
@@ -108,6 +112,10 @@ def test_the_page_is_sound_and_says_what_the_command_says(swept):
     words = " ".join(page.text)
     assert "believes too much" in words
     assert "too sure" in words
+    places = re.findall(r'<td class="n">(\d+)</td><td>(ekf|believes too much)</td>', html)
+    losses = [each["other"] for each in told["comparisons"] if each["win"]]
+    assert len(places) == len(told["cells"])
+    assert sum(int(place) for place, _ in places) == len(places) + len(losses)
     assert all(f"s{i}-{name}" in page.ids for i in (0, 1) for name in ("rmse", "nees", "nis"))
     assert {"sweep-rmse", "sweep-anees", "cost"} <= set(page.ids)
 
@@ -141,6 +149,17 @@ def test_the_screen_fits_80_columns_and_names_the_verdict(swept, monkeypatch):
     assert "…" not in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert "too sure" in done.stdout
+
+
+@pytest.mark.parametrize("ns", [9.6, 94.7, 1042.3, 9999.6, 87654.3])
+def test_the_screen_fits_whatever_a_step_costs(swept, ns):
+    folder, _ = swept
+    result = bs.compare(folder / "study.toml")
+    cells = tuple(replace(cell, ns_per_step=ns) for cell in result.cells)
+    console = Console(width=80, file=io.StringIO())
+    for part in studied(replace(result, cells=cells), (), 80):
+        console.print(part, crop=False)
+    assert max(map(len, console.file.getvalue().splitlines())) <= 80
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])

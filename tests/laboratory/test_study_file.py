@@ -9,7 +9,7 @@ import pytest
 from boresight.errors import DataError, MissingInputError, UsageError
 from boresight.experiments.scenario import lookup
 from boresight.laboratory.mistakes import StudyError
-from boresight.laboratory.study_file import describe, read_study, study_from
+from boresight.laboratory.study_file import read_study, study_from
 from boresight.models.motion import ConstantAcceleration, ConstantVelocity
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "studies").glob("*.toml"))
@@ -35,9 +35,7 @@ def only(study):
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_is_a_study(path):
-    study = read_study(path)
-    assert study.cells
-    assert len(describe(study)) >= 1 + len(study.settings)
+    assert read_study(path).cells
 
 
 def test_there_are_examples_of_every_kind_of_world():

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 WIDE, MIDDLE = 110, 80
 LEAST = {"interval": WIDE, "velocity": WIDE, "median": MIDDLE, "band": MIDDLE, "ns": MIDDLE}
-LABEL = 8  # characters that a name has at least
+LABEL = 6  # characters that a name has at least
 STYLES = {"consistent": "green", "too sure": "red", "too modest": "yellow", "no number": "red"}
 DETAILED = 4  # settings whose doubts are printed; the report has them all
 
@@ -73,8 +73,13 @@ def _row(cell: "Cell") -> "dict[str, RenderableType]":
         "band": f"{low:.3f}–{high:.3f}",
         "": text(words, STYLES[words]),
         "lost": share(cell.diverged.value),
-        "ns": figure(cell.ns_per_step, 3),
+        "ns": _whole(cell.ns_per_step),
     }
+
+
+def _whole(ns: float) -> str:
+    """Nanoseconds in at most five characters: `95`, `1,042`, `51k`."""
+    return f"{ns:,.0f}" if ns < 9999.5 else f"{ns / 1000:,.0f}k"
 
 
 def _verdicts(result: "StudyResult", setting: int) -> "list[RenderableType]":

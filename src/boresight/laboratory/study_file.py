@@ -228,20 +228,3 @@ def _causes(found: list[Mistake], wrong: list[Mistake]) -> list[Mistake]:
         if not any(other in found or len(other.path) > size for other in inside):
             causes.append(each)
     return causes
-
-
-def describe(study: Study) -> list[str]:
-    """Sentences on what a study will run."""
-    cells = len(study.cells)
-    said = [f"{study.name}: {cells} cells of {study.runs:,} runs, seed {study.seed}."]
-    for setting in study.settings:
-        swept = ", ".join(f"{name} = {value}" for name, value in setting.values)
-        labels = ", ".join(each.label for each in setting.contenders)
-        scans = f"{setting.scenario.scans} scans of {setting.scenario.dt_s:g} s"
-        said.append(
-            f"{setting.scenario.name}{f' with {swept}' if swept else ''}, {scans}: {labels}."
-        )
-    for name, what in (("truth", "the truth"), ("noise", "the noise of plots")):
-        if getattr(study, name) == "one":
-            said.append(f"All runs share {what} of run 0.")
-    return said

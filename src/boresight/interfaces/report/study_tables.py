@@ -14,6 +14,7 @@ from boresight.interfaces.report.study_words import (
 )
 from boresight.interfaces.report.words import Cell as TableCell
 from boresight.interfaces.report.words import count, figure, label, number_cell, table, text_cell
+from boresight.laboratory import comparing as order
 from boresight.laboratory.result import Cell, Interval, StudyResult
 
 MARKS = {
@@ -22,7 +23,8 @@ MARKS = {
     "too modest": ("▼", "#b34700"),
 }
 WORDS = (
-    "<p>Root mean square errors over all runs and scored scans, divergent runs included, with "
+    "<p>A place is shared where a filter loses to no more of the others. Root mean square errors "
+    "over all runs and scored scans, divergent runs included, with "
     "{percent} bootstrap intervals over runs; beside it the median run, which a few divergent runs "
     "cannot move. The bound is the Cramér-Rao bound along each trajectory, averaged in "
     "covariance. ANEES is 1 for a filter that knows its own errors; its band is where such a "
@@ -41,13 +43,14 @@ def ranking(result: StudyResult) -> str:
 def _ranking(result: StudyResult, setting: int) -> str:
     cells = cells_of(result, setting)
     name = setting_name(cells[0].values) or count(cells[0].runs, "run")
-    heads = ["filter", "position, m", "interval", "median run", "× bound", "velocity, m/s"]
-    heads += ["ANEES", "band", "verdict", "NIS/dof", "diverged", "ns a step"]
-    return table(name, heads, map(_row, cells), sortable=True)
+    heads = ["", "filter", "position, m", "interval", "median run", "× bound", "velocity, m/s"]
+    heads += ["ANEES", "band", "verdict", "NIS", "diverged", "ns a step"]
+    places = [rank.place for rank in order.ranking(result, setting)]
+    return table(name, heads, map(_row, places, cells), sortable=True)
 
 
-def _row(cell: Cell) -> list[TableCell]:
-    row = [text_cell(cell.label), _number(cell.position_rmse_m.value)]
+def _row(place: int, cell: Cell) -> list[TableCell]:
+    row = [number_cell(place), text_cell(cell.label), _number(cell.position_rmse_m.value)]
     row += [TableCell(ends(cell.position_rmse_m), is_figure=True)]
     row += [_number(cell.median_rmse_m), number_cell(cell.ratio_to_bound, 4)]
     row += [_number(cell.velocity_rmse_mps.value), _number(cell.anees.value)]
@@ -64,10 +67,8 @@ def _number(value: float) -> TableCell:
 
 
 def _share(value: Interval) -> TableCell:
-    if not value.value:
-        return TableCell(f"0 (&lt; {share(value.high)})", "0", is_figure=True)
-    low = share(value.low).removesuffix(" %")
-    words = f"{share(value.value)} ({low} to {share(value.high)})"
+    """The share of runs, and what it is below: `0.1 % (< 0.74 %)`."""
+    words = f"{share(value.value)} (&lt; {share(value.high)})"
     return TableCell(words, f"{value.value:.9g}", is_figure=True)
 
 

@@ -6,6 +6,7 @@ from html import escape
 
 from boresight.interfaces.report.verdict import Sentence
 from boresight.interfaces.report.words import figure
+from boresight.laboratory.comparing import ranking
 from boresight.laboratory.result import Cell, Comparison, Interval, StudyResult
 
 CONSISTENT = "Every filter knows its own errors: ANEES and NIS are in their bands, no run diverged."
@@ -17,13 +18,9 @@ def setting_name(values: Sequence[tuple[str, str]]) -> str:
 
 
 def cells_of(result: StudyResult, setting: int) -> list[Cell]:
-    """The contenders of a setting, smallest position error first; no number is last."""
-    mine = [cell for cell in result.cells if cell.setting == setting]
-    return sorted(mine, key=lambda cell: _last_if_none(cell.position_rmse_m.value))
-
-
-def _last_if_none(value: float) -> float:
-    return value if math.isfinite(value) else math.inf
+    """The contenders of a setting in the order of their ranking."""
+    mine = {cell.label: cell for cell in result.cells if cell.setting == setting}
+    return [mine[rank.label] for rank in ranking(result, setting)]
 
 
 def rmse(value: Interval, unit: str, digits: int = 3) -> str:
