@@ -119,4 +119,5 @@ def _timeless(text: str) -> str:
     for line in text.splitlines():
         in_table = (in_table and bool(line.strip())) or line.rstrip().endswith(" ns")
         lines.append(re.sub(r"[\d.,]+\s*$", "TIME", line) if in_table else line)
-    return " ".join(re.sub(r"[\d.,]+ (?:ns|µs|ms)\b", "TIME", " ".join(lines)).split())
+    told = re.sub("─+", "─", " ".join(lines))  # a rule is as long as times are wide
+    return " ".join(re.sub(r"[\d.,]+ (?:ns|µs|ms)\b", "TIME", told).split())
