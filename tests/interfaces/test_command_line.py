@@ -286,6 +286,7 @@ def test_control_c_ends_with_130_and_no_traceback(tmp_path):
         text=True,
     )
     end = opened(pipe)
+    time.sleep(0.5)  # from opening to reading
     running.send_signal(signal.SIGINT)
     _, said = running.communicate(timeout=20)
     os.close(end)
